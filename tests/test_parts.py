@@ -6,7 +6,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from catalogue import LINE, gear_pair, prepare
+from catalogue import FACE, LINE, gear_pair, prepare
 
 import jaxgear as jg
 from jaxgear.contact.mesh import half_way, parts
@@ -46,6 +46,17 @@ def test_parts_together_are_the_mesh(fine):
         for name in ("transmission_error", "pair_force", "contact_pressure", "corner_pressure"):
             expected = np.asarray(getattr(whole, name))[..., first::COUNT]
             np.testing.assert_allclose(getattr(part, name), expected, rtol=1e-9, atol=1e-9, err_msg=name)
+
+
+def test_no_array_of_a_part_has_the_positions_of_the_whole():
+    """Of gears of unequal width the wheel's own compliance is one of them."""
+    first, second = (jg.Gear(teeth, 3.0, face_width=20.0) for teeth in (19, 48))
+    mesh = jg.prepare(jg.GearPair(first, replace(second, face_width=24.0)), resolution=FACE)
+    whole, part = (
+        [leaf.shape for leaf in jax.tree.leaves(each) if leaf.ndim and leaf.shape[-1] == FACE.positions]
+        for each in (mesh, parts(mesh, FACE.positions // 2)[0])
+    )
+    assert whole and not part
 
 
 def assert_doubled(mesh, twice):

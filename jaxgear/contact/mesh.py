@@ -367,6 +367,9 @@ def _part(first: Array | np.ndarray, count: int, mesh: Mesh) -> Mesh:
 
 def _by_position(mesh: Mesh) -> list[Array | AbstractSpring]:
     """Everything whose last axis is that of the positions."""
+    coupled: list[Array] = []
+    if mesh.coupling is not None and mesh.coupling.other is not None:
+        coupled.append(mesh.coupling.other.compliance)
     return [
         mesh.outer_steps,
         mesh.outer_gap,
@@ -377,4 +380,5 @@ def _by_position(mesh: Mesh) -> list[Array | AbstractSpring]:
         mesh.law,
         mesh.width_factor,
         *(side.contact_roll_length for side in mesh.sides),
+        *coupled,
     ]
