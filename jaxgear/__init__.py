@@ -2,7 +2,7 @@
 
 The pipeline in reading order, every step differentiable and vmappable:
 
-    Gear, GearPair              geometry of an external involute spur pair
+    Gear, GearPair              geometry of an external involute pair, spur or helical
     TipRelief + LeadCrowning    microgeometry, composed with `+`
     default_compliance          teeth, gear bodies with coupled neighbours, Hertzian contact
     finite_element_compliance   teeth and bodies by finite elements, for gears that stay as they are

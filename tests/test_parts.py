@@ -48,10 +48,12 @@ def test_parts_together_are_the_mesh(fine):
             np.testing.assert_allclose(getattr(part, name), expected, rtol=1e-9, atol=1e-9, err_msg=name)
 
 
-def test_no_array_of_a_part_has_the_positions_of_the_whole():
-    """Of gears of unequal width the wheel's own compliance is one of them."""
-    first, second = (jg.Gear(teeth, 3.0, face_width=20.0) for teeth in (19, 48))
-    mesh = jg.prepare(jg.GearPair(first, replace(second, face_width=24.0)), resolution=FACE)
+@pytest.mark.parametrize("helix_angle, wider", [(None, 4.0), (15.0, 0.0)], ids=["wider", "helical"])
+def test_no_array_of_a_part_has_the_positions_of_the_whole(helix_angle, wider):
+    first, second = (jg.Gear(teeth, 3.0, face_width=20.0, helix_angle=helix_angle) for teeth in (19, 48))
+    other = None if helix_angle is None else -helix_angle
+    pair = jg.GearPair(first, replace(second, face_width=20.0 + wider, helix_angle=other))
+    mesh = jg.prepare(pair, resolution=replace(FACE, pairs=4))
     whole, part = (
         [leaf.shape for leaf in jax.tree.leaves(each) if leaf.ndim and leaf.shape[-1] == FACE.positions]
         for each in (mesh, parts(mesh, FACE.positions // 2)[0])

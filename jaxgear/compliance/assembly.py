@@ -13,7 +13,7 @@ from .body import AbstractBody, ElasticRing, Sainsot
 from .edge import EdgeLaw, edge
 from .hertz import AbstractContact, ConstantHertz, ContactGeometry, DepthReferenced
 from .laws import AbstractLaw
-from .plane import PlaneState, check_plane_state, plane_stress_share, structure_planes
+from .plane import Plane, PlaneState, check_plane_state, plane_stress_share, structure_planes
 from .tooth import AbstractTooth, Beam
 from .toothload import ToothLoad
 
@@ -113,9 +113,17 @@ class Compliance(AbstractCompliance):
         planes = structure_planes(self.plane)
         shares = on_both(lambda load: plane_stress_share(load.outline, load.outline.gear.face_width), pinion, wheel)
         bodies = _mixed(shares, self.body.of_both(pinion, wheel, planes, known))
-        teeth = _mixed(shares, on_both(lambda load: self.tooth.in_planes(load, planes), pinion, wheel))
+        teeth = _mixed(shares, on_both(lambda load: self._teeth(load, planes), pinion, wheel))
         own = jnp.eye(teeth.shape[1], dtype=bool)[None, :, :, None]
         return jnp.where(own, bodies + teeth[:, None], bodies)
+
+    def _teeth(self, load: ToothLoad, planes: tuple[Plane, ...]) -> Float[Array, "planes pairs positions"]:
+        """Compliance of the teeth, which bend in the section normal to their trace."""
+        if load.normal is None:
+            return self.tooth.in_planes(load, planes)
+        gear = load.outline.gear
+        along_trace = gear.helix_cosine / jnp.cos(gear.base_helix_angle) ** 2
+        return self.tooth.in_planes(load.normal, planes) * along_trace
 
     def hub(self, pinion: ToothLoad, wheel: ToothLoad) -> Float[Array, "gears"]:
         return jnp.stack([self.body.hub(pinion.outline), self.body.hub(wheel.outline)])

@@ -23,6 +23,7 @@ from ..geometry.outline import Outline
 from ..numerics import Checked, count, on_both
 from . import ring
 from .plane import Plane, check_plane, plane_modulus, plane_poisson
+from .plate import axial_compliance
 from .toothload import ToothLoad
 
 _TABLE = np.array(
@@ -76,7 +77,9 @@ class AbstractBody(Checked):
 
     @abstractmethod
     def hub(self, outline: Outline) -> Float[Array, ""]:
-        """Rotation of the root circle against the bore, on the line of action, in um per N/mm of total line load."""
+        """What all teeth share: rotation of the root circle against the bore, and of helical gears the axial deflection
+        of the body, on the line of action, in um per N/mm of total line load.
+        """
 
 
 class ElasticRing(AbstractBody):
@@ -144,11 +147,15 @@ class ElasticRing(AbstractBody):
         return 1e3 / modulus * shape
 
     def hub(self, outline: Outline) -> Float[Array, ""]:
-        """(1 + nu) (h^2 - 1) / (2 pi E) (r_b / r_f)^2: torsion of the ring, the same in both plane states."""
+        """(1 + nu) (h^2 - 1) / (2 pi E) (r_b / r_f)^2: torsion of the ring, the same in both plane states; of helical
+        gears with what the axial force tilts and dishes the body (see `plate`).
+        """
         gear, material = outline.gear, outline.gear.material
         ratio = gear.root_circle_radius / gear.bore_radius
         torsion = (1 + material.poisson_ratio) * (ratio**2 - 1) / (2 * jnp.pi * material.elastic_modulus)
         value = 1e3 * torsion * (gear.base_radius / gear.root_circle_radius) ** 2
+        if gear.helix_angle is not None:
+            value = value + axial_compliance(gear) * gear.face_width * jnp.tan(gear.base_helix_angle) ** 2
         return value if self.hub_windup else jnp.zeros_like(value)
 
 

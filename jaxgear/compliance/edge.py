@@ -36,7 +36,7 @@ from .hertz import ContactGeometry, ContactSide
 from .laws import AbstractLaw, Cut, polynomial
 from .toothload import ToothLoad
 
-Field = Float[Array, "pairs 1 positions"]
+Field = Float[Array, "pairs #slices positions"]
 Real = Float[Array, "..."]
 
 # Distance from the corner, relative to the depth of the centreline below it, at which the wedge's excess compliance

@@ -32,8 +32,12 @@ _DEPTH_TERMS = 10
 class ContactSide(Checked):
     """One flank at the contact; arrays of shape (pairs, 1, positions).
 
+    Flanks touch in the section normal to the line of contact. Of helical gears, whose base helix angle is beta_b, the
+    depth is that of this section; moduli are cos(beta_b) times those of the material, so that deflections count along
+    the transverse line of action; with the transverse radius the half width is again that of the normal section.
+
     Attributes:
-        radius: radius of curvature [mm].
+        radius: radius of curvature in the transverse section [mm].
         depth: distance from the contact to the tooth centreline along the load line [mm].
         young: Young's modulus [MPa].
         modulus: modulus of the plane problem, E' [MPa].
@@ -80,14 +84,15 @@ def contact_geometry(pinion: ToothLoad, wheel: ToothLoad, plane: Plane, face_wid
         return jnp.broadcast_to(value, shape)[:, None]
 
     def side(load: ToothLoad) -> ContactSide:
-        material = load.outline.gear.material
+        gear, material = load.outline.gear, load.outline.gear.material
+        inclined = 1.0 if gear.helix_angle is None else jnp.cos(gear.base_helix_angle)
         return ContactSide(
             radius=field(load.roll_length),
-            depth=field(load.depth),
-            young=field(material.elastic_modulus),
-            modulus=field(plane_modulus(material, plane)),
+            depth=field(load.depth * inclined),
+            young=field(material.elastic_modulus * inclined),
+            modulus=field(plane_modulus(material, plane) * inclined),
             poisson=field(plane_poisson(material, plane)),
-            strain_modulus=field(plane_modulus(material, "strain")),
+            strain_modulus=field(plane_modulus(material, "strain") * inclined),
         )
 
     return ContactGeometry(side(pinion), side(wheel), field(face_width))

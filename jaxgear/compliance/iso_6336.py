@@ -7,7 +7,7 @@ References:
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ..geometry import GearPair, path_of_contact
+from ..geometry import GearPair, check_spur, path_of_contact
 from ..numerics import Checked, Given, check, program, real, result
 
 Scalar = Float[Array, ""]
@@ -39,6 +39,7 @@ def iso_stiffness(pair: GearPair, line_load: Given = _LIGHT_LOAD) -> IsoStiffnes
         pair: gear pair; the standard covers x1 >= x2 and -0.5 <= x1 + x2 <= 2.
         line_load: F_t K_A / b [N/mm]; below 100 N/mm the stiffness is reduced.
     """
+    check_spur("iso_stiffness", *pair.gears)
     check("iso_stiffness", "line_load", line_load, "N/mm", low=0.0)
     return _iso_stiffness(pair, real(line_load))
 

@@ -12,7 +12,7 @@ from jaxtyping import Array, Float
 
 from ..numerics import AbstractSpring, log
 
-Field = Float[Array, "pairs 1 positions"]
+Field = Float[Array, "pairs #slices positions"]
 Real = Float[Array, "..."]
 
 

@@ -1,10 +1,11 @@
 """Where the load line crosses a tooth: the quantities that every compliance model needs."""
 
+import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..geometry.outline import Outline
-from ..numerics import Checked, result
+from ..numerics import Checked, result, safe_sqrt
 
 Real = Float[Array, "..."]
 
@@ -18,6 +19,8 @@ class ToothLoad(Checked):
         angle: between the load line and the normal to the tooth centreline [rad].
         height: y of the crossing of load line and centreline [mm].
         depth: distance from the loaded point to that crossing along the load line [mm].
+        normal: of a helical gear the load on the tooth of its virtual gear, at the same height of the tooth; None of a
+            spur gear.
     """
 
     outline: Outline
@@ -25,6 +28,7 @@ class ToothLoad(Checked):
     angle: Real = result("rad")
     height: Real = result("mm")
     depth: Real = result("mm")
+    normal: "ToothLoad | None" = eqx.field(default=None, repr=False)
 
 
 def tooth_load(outline: Outline, roll_length: Real) -> ToothLoad:
@@ -37,4 +41,9 @@ def tooth_load(outline: Outline, roll_length: Real) -> ToothLoad:
     drawn = outline.curves.over(roll_length.shape)
     angle = jnp.arctan(roll_length / drawn.base_radius) - drawn.half_angle(roll_length)  # as `load_angle`
     x, _ = drawn.involute(roll_length)
-    return ToothLoad(outline, roll_length, angle, drawn.base_radius / jnp.cos(angle), x / jnp.cos(angle))
+    normal = None
+    if outline.normal is not None:
+        gear = outline.normal.gear
+        above = jnp.sqrt(drawn.base_radius**2 + roll_length**2) - drawn.pitch_radius
+        normal = tooth_load(outline.normal, safe_sqrt((gear.pitch_radius + above) ** 2 - gear.base_radius**2))
+    return ToothLoad(outline, roll_length, angle, drawn.base_radius / jnp.cos(angle), x / jnp.cos(angle), normal)

@@ -2,6 +2,7 @@
 
 from .component import ModifiedMesh as ModifiedMesh
 from .covering import fewest_pairs as fewest_pairs
+from .covering import helical_slices as helical_slices
 from .cycle import MeshCycle as MeshCycle
 from .flank_table import flank_table as flank_table
 from .kinematics import Kinematics as Kinematics

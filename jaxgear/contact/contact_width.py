@@ -13,7 +13,7 @@ from jaxtyping import Array, Float
 
 from ..geometry import reduced_radius
 from ..microgeometry import AbstractModification, Flank, NoModification, terms
-from ..numerics import by_numbers, safe_sqrt
+from ..numerics import by_numbers, over_slices, safe_sqrt
 from .kinematics import Side
 from .mesh import Mesh
 
@@ -27,7 +27,7 @@ _NARROWEST = 1e-3
 
 
 class PlaceSide(NamedTuple):
-    """One gear's side of the contacts: numbers of shape (1, 1, 1), roll length of shape (pairs, 1, positions).
+    """One gear's side of the contacts: numbers of shape (1, 1, 1), roll length of (pairs, 1 or slices, positions).
 
     Attributes:
         direction: +1 where moving towards the pinion tip makes the roll length grow, else -1.
@@ -43,7 +43,8 @@ class PlaceSide(NamedTuple):
 
 
 class Place(NamedTuple):
-    """Where the contacts are and how far they may slide [mm], positive towards the pinion tip; (pairs, 1, positions).
+    """Where the contacts are and how far they may slide [mm], positive towards the pinion tip; (pairs, 1 or
+    slices, positions).
 
     The half width may differ from slice to slice.
 
@@ -65,8 +66,8 @@ class Place(NamedTuple):
 def place_of(mesh: Mesh, torque: Scalar, line_load: Real | None = None) -> Place:
     """Where the contacts of a mesh are; as wide as their line loads make them [N/mm], where these are given."""
     first, second = mesh.sides
-    radius = reduced_radius(first.contact_roll_length, second.contact_roll_length)[:, None]
-    outside, path, contact = mesh.outside, mesh.path, mesh.path_of_contact
+    radius = over_slices(reduced_radius(first.contact_roll_length, second.contact_roll_length))
+    outside, path, contact = mesh.kinematics.contact_outside, mesh.kinematics.contact_path, mesh.path_of_contact
     over = []
     for side in (first, second):
         # arc length of the tip's involute over the path that is left out
@@ -80,7 +81,8 @@ def place_of(mesh: Mesh, torque: Scalar, line_load: Real | None = None) -> Place
     sides = _side(mesh, first, 1.0), _side(mesh, second, -1.0)
     narrowest = _NARROWEST * radius
     half_width = jnp.maximum(_half_width(mesh, torque, line_load), narrowest)
-    return Place(radius, half_width, beyond[:, None], -inside[1][:, None], inside[0][:, None], sides)
+    beyond, before, ahead = map(over_slices, (beyond, inside[1], inside[0]))
+    return Place(radius, half_width, beyond, -before, ahead, sides)
 
 
 def _side(mesh: Mesh, side: Side, direction: float) -> PlaceSide:
@@ -89,7 +91,7 @@ def _side(mesh: Mesh, side: Side, direction: float) -> PlaceSide:
 
     return PlaceSide(
         direction,
-        side.contact_roll_length[:, None],
+        over_slices(side.contact_roll_length),
         number(side.base_radius),
         number(side.tip_roll_length),
         number(side.start_roll_length),
@@ -200,6 +202,6 @@ def secant_slope(sided_terms: Sequence[Sided], place: Place, moved: Real) -> Rea
 def _half_width(mesh: Mesh, torque: Scalar, line_load: Real | None) -> Float[Array, "pairs #slices positions"]:
     """Half width of the contact over which modifications are averaged [mm]: by default of one pair that carries all."""
     if line_load is not None:
-        return safe_sqrt(mesh.width_factor[:, None] * line_load)
+        return safe_sqrt(over_slices(mesh.width_factor) * line_load)
     force = 1e3 * torque / mesh.pair.pinion.base_radius
-    return safe_sqrt(mesh.width_factor * force / mesh.pair.face_width)[:, None]
+    return over_slices(safe_sqrt(mesh.width_factor * force / mesh.pair.face_width))

@@ -16,6 +16,8 @@ from .resolution import Resolution, reach
 # its load and shrink with its module, so that 8 um per mm are about 500 MPa; twice that leaves room for deep reliefs.
 _DEFLECTION = 16.0
 _PAIRS_TRACED = 4
+# Slices of helical gears: for every base pitch that the face overlaps, and at least.
+_PER_PITCH, _FEWEST_SLICES = 10, 11
 
 
 def pairs_for(pair: GearPair, deflection: float | None) -> int:
@@ -59,7 +61,40 @@ def _gaps_at(pair: GearPair, reaches: Sequence[tuple[int, int]]) -> Array:
 
 def _next_pairs(pair: GearPair, contact: PathOfContact, reach: Float[Array, "windows 2"]) -> Contacts:
     """The first pairs beyond windows of (behind, ahead) base pitches, where they are nearest; shape (windows, 2)."""
-    return contacts(pair, contact, jnp.stack([-reach[:, 0], reach[:, 1]], axis=1) * contact.base_pitch)
+    nearer = _half_overlap(pair)
+    ends = [nearer - reach[:, 0] * contact.base_pitch, reach[:, 1] * contact.base_pitch - nearer]
+    return contacts(pair, contact, jnp.stack(ends, axis=1))
+
+
+def _half_overlap(pair: GearPair) -> Float[Array, ""]:
+    """By how much the end of the face is ahead of its middle on the path of contact [mm]."""
+    return 0.5 * pair.face_width * jnp.abs(pair.path_slope)
+
+
+def helical_slices(pair: GearPair) -> int:
+    """Slices that show how the contact lines of a pair run over its flanks, one for spur gears.
+
+    Contacts of neighbouring slices are at most a tenth of a base pitch apart on the path of contact. A helix angle that
+    is traced takes as many as an overlap ratio of one.
+    """
+    if pair.is_spur:
+        return 1
+    overlap = concrete(pair.overlap_ratio)
+    wanted = _PER_PITCH if overlap is None else int(np.ceil(_PER_PITCH * float(overlap)))
+    return max(_FEWEST_SLICES, wanted | 1)
+
+
+def check_slices(pair: GearPair, resolution: Resolution) -> None:
+    """Refuses helical gears on a single slice.
+
+    Raises:
+        ValueError: naming the number of slices that shows them.
+    """
+    if resolution.slices == 1 and not pair.is_spur:
+        raise ValueError(
+            "Resolution: slices = 1 cannot show helical gears, whose contact lines run across the face: "
+            f"Resolution(slices={helical_slices(pair)})"
+        )
 
 
 def closing(points: Contacts) -> Float[Array, "..."]:
@@ -67,16 +102,17 @@ def closing(points: Contacts) -> Float[Array, "..."]:
     return points.corner_gap / points.lever
 
 
-def check_cover(contact: PathOfContact, resolution: Resolution) -> None:
+def check_cover(pair: GearPair, contact: PathOfContact, resolution: Resolution) -> None:
     """Refuses a path of contact that the pairs of a resolution do not cover, as far as it is known.
 
     Raises:
         ValueError: naming the number of pairs that does.
     """
-    start, end, pitch = map(concrete, (contact.start, contact.end, contact.base_pitch))
-    if start is None or end is None or pitch is None:
+    ahead_of_middle = 0.0 if pair.is_spur else _half_overlap(pair)
+    start, end, pitch, more = map(concrete, (contact.start, contact.end, contact.base_pitch, ahead_of_middle))
+    if start is None or end is None or pitch is None or more is None:
         return
-    start, end = start / pitch, end / pitch
+    start, end = (start - more) / pitch, (end + more) / pitch
     behind, ahead = resolution.reach
     if (end > ahead).any() or (-start > behind).any():
         needed = max(2 * int(float(end.max()) // 1) + 1, 2 * int(float(-start.min()) // 1) + 2)

@@ -8,7 +8,7 @@ from jaxtyping import Array, Float, Int8
 from ..compliance.plane import combined_modulus
 from ..geometry import Margins, reduced_radius
 from ..microgeometry import AbstractModification
-from ..numerics import over_batch, program, safe_sqrt
+from ..numerics import over_batch, over_slices, program, safe_sqrt
 from .kinematics import Kinematics, Side
 from .operating_point import OperatingPoint
 from .status import WithStatus, reason
@@ -34,13 +34,14 @@ def flank_pressure(kinematics: Kinematics, line_load: Load, relative_curvature: 
     contact width. At a kink, where the pressure is singular, that is its mean over the contact: finite elements have up
     to 55 % more there.
 
-    E* is that of plane strain, the usual form, unless the compliance model is in plane stress throughout: 5 % less.
+    E* is that of plane strain, the usual form, unless the compliance model is in plane stress throughout: 5 % less. The
+    flanks of helical gears touch in the section normal to the contact line, R / cos(beta_b).
     """
     pinion, wheel = kinematics.sides
     reduced = reduced_radius(pinion.contact_roll_length, wheel.contact_roll_length)
-    inside = kinematics.outside <= 0
-    reduced = reduced[:, None] / jnp.maximum(1 + relative_curvature, FLATTEST)
-    return jnp.where(inside[:, None], _hertz(kinematics, line_load, reduced), 0.0)
+    inside = kinematics.contact_outside <= 0
+    reduced = over_slices(reduced) / jnp.maximum(1 + relative_curvature, FLATTEST)
+    return jnp.where(over_slices(inside), _hertz(kinematics, line_load, reduced), 0.0)
 
 
 def corner_pressure(kinematics: Kinematics, line_load: Load) -> Load:
@@ -50,16 +51,18 @@ def corner_pressure(kinematics: Kinematics, line_load: Load) -> Load:
     about 50 % (0.002 mm) above the exact solution of a rounded edge.
     """
     pinion, wheel = kinematics.sides
-    before = kinematics.path < kinematics.path_of_contact.start
+    before = kinematics.contact_path < kinematics.path_of_contact.start
     edge = jnp.where(before, wheel.gear.tip_edge_radius, pinion.gear.tip_edge_radius)
     mate = jnp.where(before, pinion.contact_roll_length, wheel.contact_roll_length)
-    outside = kinematics.outside > 0
-    return jnp.where(outside[:, None], _hertz(kinematics, line_load, reduced_radius(edge, mate)[:, None]), 0.0)
+    outside = over_slices(kinematics.contact_outside > 0)
+    return jnp.where(outside, _hertz(kinematics, line_load, over_slices(reduced_radius(edge, mate))), 0.0)
 
 
 def _hertz(kinematics: Kinematics, line_load: Load, reduced) -> Load:
     pair = kinematics.pair
     modulus = combined_modulus(pair.pinion.material, pair.wheel.material, kinematics.plane)
+    if kinematics.helical:
+        reduced = reduced / jnp.cos(pair.pinion.base_helix_angle)
     return safe_sqrt(line_load * modulus / (jnp.pi * reduced))
 
 
@@ -81,7 +84,8 @@ class MeshCycle(WithStatus, eqx.Module):
         transmission_error: loaded, on the line of action, positive when the wheel lags [um], shape (positions,);
             with the deflection of shafts, bearings and housing, where the mesh was prepared with them.
         unloaded_transmission_error: the same at vanishing load [um].
-        line_load: [N/mm], shape (pairs, slices, positions).
+        line_load: [N/mm], shape (pairs, slices, positions): force on the transverse line of action per face width,
+            which of helical gears is the normal force per length of the contact line.
         pair_force: force on the line of action that every pair contributes [N], shape (pairs, positions); the pairs of
             a position sum to `force`.
         opening: remaining gap [um] where positive, minus the contact deflection where loaded.

@@ -71,7 +71,7 @@ def corner_gap(
 
 
 Scalar = Float[Array, ""]
-Field = Float[Array, "pairs positions"]
+Field = Float[Array, "pairs *slices positions"]  # with slices where each of them has its own phase
 
 
 class Side(Checked):
@@ -81,7 +81,8 @@ class Side(Checked):
         gear: the gear, with numbers where that of the pair leaves the diameters of tip or bore open.
         start_roll_length, pitch_roll_length: roll lengths at the start of the active profile and at the pitch point
             [mm].
-        contact_roll_length: roll length of every contact [mm], shape (pairs, positions).
+        contact_roll_length: roll length of every contact [mm], shape (pairs, positions); of helical gears (pairs,
+            slices, positions).
         face_middle: middle of the common face of the pair, from the middle of the gear's own face [mm].
         common_width: of that face, over which both gears overlap [mm].
     """
@@ -132,6 +133,7 @@ class Kinematics(Checked):
         first_phase: mesh position with which the base pitch begins, in base pitches: that of all cycles of a batch.
         resolution: array sizes.
         plane: "stress" or "strain", of the contact.
+        helical: whether every slice has its own phase: where the gears have a helix angle that is not known to be zero.
     """
 
     pair: GearPair
@@ -139,6 +141,7 @@ class Kinematics(Checked):
     first_phase: Scalar = result("base pitches")
     resolution: Resolution
     plane: Plane = eqx.field(static=True)
+    helical: bool = eqx.field(static=True, default=False)
 
     @property
     def batch_ndim(self) -> int:
@@ -151,19 +154,51 @@ class Kinematics(Checked):
         return _phases(self.first_phase, self.resolution.positions)
 
     @property
-    @over_batch
-    @program
-    def path(self) -> Field:
-        """Nominal path position of every pair [mm], shape (pairs, positions)."""
-        offset = self.resolution.leading - self._count(self.resolution.chosen_pairs)
-        return (self.phase[None] + offset[:, None]) * self.path_of_contact.base_pitch
+    def path(self) -> Float[Array, "*cycles pairs positions"]:
+        """Nominal path position of every pair of spur gears [mm], shape (pairs, positions).
+
+        Raises:
+            ValueError: for helical gears, see `contact_path`.
+        """
+        self._check_spur("path")
+        return self.contact_path
+
+    @property
+    def outside(self) -> Float[Array, "*cycles pairs positions"]:
+        """Distance of every pair of spur gears outside the path of contact [mm], zero on it, shape (pairs, positions).
+
+        Raises:
+            ValueError: for helical gears, see `contact_outside`.
+        """
+        self._check_spur("outside")
+        return self.contact_outside
+
+    def _check_spur(self, name: str) -> None:
+        if self.helical:
+            raise ValueError(
+                f"Kinematics: {name} is of spur gears; helical ones touch elsewhere in every slice of the face: "
+                f"contact_{name} has them, and what asks for {name} does not know helical gears yet"
+            )
 
     @property
     @over_batch
     @program
-    def outside(self) -> Field:
-        """Distance of every pair outside the path of contact [mm], zero on it, shape (pairs, positions)."""
-        path, contact = self.path, self.path_of_contact
+    def contact_path(self) -> Field:
+        """Nominal path position of every contact [mm], shape (pairs, positions); of helical gears (pairs, slices,
+        positions).
+        """
+        offset = self.resolution.leading - self._count(self.resolution.chosen_pairs)
+        middle = (self.phase[None] + offset[:, None]) * self.path_of_contact.base_pitch
+        if not self.helical:
+            return middle
+        return middle[:, None] + (self.face_coordinate * self.pair.path_slope)[None, :, None]
+
+    @property
+    @over_batch
+    @program
+    def contact_outside(self) -> Field:
+        """Distance of every contact outside the path of contact [mm], zero on it, of the shape of `contact_path`."""
+        path, contact = self.contact_path, self.path_of_contact
         return jnp.maximum(jnp.maximum(contact.start - path, path - contact.end), 0.0)
 
     @property
@@ -206,7 +241,7 @@ class Kinematics(Checked):
 @program
 def _sides(moving: Kinematics) -> tuple[Side, Side]:
     pair, contact = moving.pair, moving.path_of_contact
-    return sides(pair, contact, contacts(pair, contact, moving.path))
+    return sides(pair, contact, contacts(pair, contact, moving.contact_path))
 
 
 def _phases(first: Array, count: int) -> Array:
@@ -306,4 +341,5 @@ def sides(pair: GearPair, contact: PathOfContact, points: Contacts) -> tuple[Sid
 def kinematics(pair: GearPair, first_phase: Scalar, resolution: Resolution, plane: Plane) -> Kinematics:
     """The kinematics of a pair."""
     contact = path_of_contact(pair)
-    return Kinematics(pair, contact, first_phase.astype(contact.start.dtype), resolution, plane)
+    helical = pair.pinion.helix_angle is not None
+    return Kinematics(pair, contact, first_phase.astype(contact.start.dtype), resolution, plane, helical)

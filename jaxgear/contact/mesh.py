@@ -15,10 +15,10 @@ from ..compliance.plane import contact_plane
 from ..compliance.toothload import tooth_load
 from ..geometry import GearPair, Margins, Outline, PathOfContact, explicit, margins_between, outline, path_of_contact
 from ..microgeometry import Flank
-from ..numerics import AbstractSpring, Given, SliceCoupling, changed, on_both, program
+from ..numerics import AbstractSpring, Given, SliceCoupling, changed, on_both, over_slices, program
 from ..numerics.programs import begin
-from .covering import check_cover, closing, pairs_for
-from .face_coupling import check_modes, check_support, coupling_of, ends_together, spreading_of
+from .covering import check_cover, check_slices, closing, helical_slices, pairs_for
+from .face_coupling import check_modes, check_support, coupling_of, ends_together, slices_alike, spreading_of
 from .kinematics import Kinematics, Side, contacts, kinematics, sides
 from .resolution import Resolution
 from .status import Status, Statuses, status_of
@@ -56,11 +56,14 @@ def gears_of(pair: GearPair, compliance: AbstractCompliance, count: int) -> Gear
 
 
 Scalar = Float[Array, ""]
-Field = Float[Array, "pairs positions"]
+Field = Float[Array, "pairs *slices positions"]  # with slices where each of them has its own phase
 
 
 class Mesh(eqx.Module):
     """A gear pair prepared for contact analysis; made by `prepare`.
+
+    Of helical gears every slice of the face is at its own phase: what has the shape (pairs, positions) below then has
+    (pairs, slices, positions).
 
     Attributes:
         kinematics: the pair, its path of contact and the array sizes, which the results keep.
@@ -76,7 +79,7 @@ class Mesh(eqx.Module):
         outer_steps: by how much farther they touch the mates than the pairs at the edge do, over what those there move
             on within one position, shape (2, positions).
         structure: compliance of both gears under a load that is uniform over the common face, the mean over that face,
-            (pairs, pairs, positions) [um per N/mm].
+            (pairs, pairs, positions) [um per N/mm]; of helical gears whose slices are not coupled that of every slice.
         law: prepared contact law.
         width_factor: squared half width of the contact per line load [mm^2 per N/mm].
         hub: common wind-up of the gear bodies, each over its own face, under a line load over the common one [um per
@@ -98,10 +101,10 @@ class Mesh(eqx.Module):
     corner_gap: Field
     lever: Field
     margins: Margins
-    outer_gap: Float[Array, "2 positions"]
-    outer_lever: Float[Array, "2 positions"]
-    outer_steps: Float[Array, "2 positions"]
-    structure: Float[Array, "pairs pairs positions"]
+    outer_gap: Float[Array, "2 *slices positions"]
+    outer_lever: Float[Array, "2 *slices positions"]
+    outer_steps: Float[Array, "2 *slices positions"]
+    structure: Float[Array, "pairs pairs *own positions"]
     law: AbstractSpring
     width_factor: Field
     hub: Scalar
@@ -145,12 +148,12 @@ class Mesh(eqx.Module):
 
     @property
     def path(self) -> Field:
-        """Nominal path position of every pair [mm], shape (pairs, positions)."""
+        """Nominal path position of every pair of spur gears [mm], shape (pairs, positions)."""
         return self.kinematics.path
 
     @property
     def outside(self) -> Field:
-        """Distance of every pair outside the path of contact [mm], zero on it."""
+        """Distance of every pair of spur gears outside the path of contact [mm], zero on it."""
         return self.kinematics.outside
 
     @property
@@ -160,7 +163,7 @@ class Mesh(eqx.Module):
 
     def held(self, gap: Float[Array, "pairs slices positions"]) -> Float[Array, "pairs slices positions"]:
         """A gap of the flanks [um] with the gap of the support."""
-        return gap if self.support_gap is None else gap + self.lever[:, None] * self.support_gap[None, :, None]
+        return gap if self.support_gap is None else gap + over_slices(self.lever) * self.support_gap[None, :, None]
 
     def support_deflection(self, line_load: Float[Array, "pairs slices positions"]) -> Float[Array, " positions"]:
         """Transmission error by deflection of the support, alike for all pairs, under line loads [N/mm], in um."""
@@ -171,7 +174,7 @@ class Mesh(eqx.Module):
         """Points of pinion and wheel that face each other at a distance from the centre of contact.
 
         Args:
-            offset: distance along the flanks, towards the pinion tip [mm], scalar or (pairs, positions).
+            offset: distance along the flanks, towards the pinion tip [mm], scalar or of the shape of `path`.
 
         Returns:
             points whose fields broadcast to (pairs, slices, positions).
@@ -183,7 +186,7 @@ class Mesh(eqx.Module):
         rho = side.contact_roll_length
         # arc length of an involute: ds = rho / r_b d rho
         moved = jnp.maximum(rho + offset * side.base_radius / rho, 0.0)
-        return side.flank(moved[:, None], (self.face_coordinate + side.face_middle)[None, :, None])
+        return side.flank(over_slices(moved), (self.face_coordinate + side.face_middle)[None, :, None])
 
 
 def prepare(
@@ -199,7 +202,7 @@ def prepare(
     Args:
         pair: gear pair; every number in it may be traced.
         compliance: compliance model; None for `default_compliance()`.
-        resolution: array sizes; None for `Resolution()`.
+        resolution: array sizes; None for `Resolution()`, of helical gears with the slices of `helical_slices`.
         deflection: transmission error that the pairs have to contain where the resolution leaves their number open
             [um]; None for 16 um per mm of module, at which root stresses are beyond 1000 MPa. Gears that are traced
             take four pairs.
@@ -213,17 +216,19 @@ def prepare(
 
     Raises:
         ValueError: when the path of contact is longer than the pairs of the resolution can cover, or the compliance is
-            a table of other gears; for a support of other gears, or on a mesh whose slices are not coupled.
+            a table of other gears; for a support of other gears, or on a mesh whose slices are not coupled; for helical
+            gears on a single slice.
     """
     compliance = default_compliance() if compliance is None else compliance
     compliance.check(pair)
-    resolution = Resolution() if resolution is None else resolution
+    resolution = Resolution(slices=helical_slices(pair)) if resolution is None else resolution
+    check_slices(pair, resolution)
     automatic = resolution.pairs is None
     if automatic:
         resolution = replace(resolution, pairs=pairs_for(explicit(pair), deflection))
     check_support(support, pair, resolution)
     mesh = prepare_from(np.zeros(()), pair, compliance, resolution, support, ends_together(pair, compliance))
-    check_cover(mesh.path_of_contact, resolution)
+    check_cover(mesh.pair, mesh.path_of_contact, resolution)
     check_modes(support, resolution)
     return replace(mesh, automatic=True) if automatic else mesh
 
@@ -277,15 +282,24 @@ def _arrays_of(
     plane = contact_plane(compliance.plane)
     moving = kinematics(pair, first_phase, resolution, plane)
     contact = moving.path_of_contact
-    points = contacts(pair, contact, moving.path, resolution.extended_contact)
-    rolls = points.pinion_roll_length, points.wheel_roll_length
+    points = contacts(pair, contact, moving.contact_path, resolution.extended_contact)
+    # what compliances know of are pairs at positions: of helical gears those of all slices
+    rolls = [at.reshape(len(at), -1) for at in (points.pinion_roll_length, points.wheel_roll_length)]
     pinion, wheel = on_both(lambda given: tooth_load(*given), *zip(outlines, rolls))
     geometry = contact_geometry(pinion, wheel, plane, pair.face_width)
+    law = compliance.law(geometry, pinion, wheel, moving.contact_outside.reshape(rolls[0].shape))
     base_pitch = contact.base_pitch
-    beyond = jnp.stack([moving.path[-1] - base_pitch, moving.path[0] + base_pitch])
+    beyond = jnp.stack([moving.contact_path[-1] - base_pitch, moving.contact_path[0] + base_pitch])
     outer = contacts(pair, contact, beyond, resolution.extended_contact)
     spreading = spreading_of(pair, outlines, resolution, even)
     structures = spreading.shares[:, None, None, None] * compliance.structure(pinion, wheel)
+    width_factor, scale = geometry.width_factor[:, 0], None
+    if moving.helical:
+        shape = moving.contact_path.shape
+        law = jax.tree.map(lambda leaf: leaf.reshape(shape), law)
+        width_factor, structures = width_factor.reshape(shape), structures.reshape(*structures.shape[:-1], *shape[1:])
+        if resolution.is_coupled:
+            structures, scale = slices_alike(structures)
     hubs = compliance.hub(pinion, wheel)
     if not even:
         hubs = hubs * (pair.face_width / jnp.stack([gear.face_width for gear in pair.gears]))
@@ -300,16 +314,16 @@ def _arrays_of(
         outer_lever=outer.lever,
         outer_steps=jnp.stack(
             [
-                _steps(points.pinion_roll_length[-1, :2], outer.pinion_roll_length[0]),
-                _steps(points.wheel_roll_length[0, :-3:-1], outer.wheel_roll_length[1]),
+                _steps(points.pinion_roll_length[-1, ..., :2], outer.pinion_roll_length[0]),
+                _steps(points.wheel_roll_length[0, ..., :-3:-1], outer.wheel_roll_length[1]),
             ]
         ),
         structure=structures[0] + structures[1],
-        law=compliance.law(geometry, pinion, wheel, moving.outside),
-        width_factor=geometry.width_factor[:, 0],
+        law=law,
+        width_factor=width_factor,
         hub=jnp.sum(hubs),
         slice_width=moving.slice_width,
-        coupling=coupling_of(moving, spreading, structures[1], support),
+        coupling=coupling_of(moving, spreading, structures[1], scale, support),
         support=support,
         support_gap=None if support is None else support.gap(moving.face_coordinate).astype(moving.slice_width.dtype),
         support_torque=None if support is None else support.torque,
@@ -318,10 +332,13 @@ def _arrays_of(
     )
 
 
-def _steps(edge: Float[Array, "2"], beyond: Float[Array, " positions"]) -> Float[Array, " positions"]:
+def _steps(
+    edge: Float[Array, "*slices 2"], beyond: Float[Array, "*slices positions"]
+) -> Float[Array, "*slices positions"]:
     edge, beyond = jax.lax.stop_gradient((edge, beyond))
-    one = jnp.maximum(jnp.abs(edge[0] - edge[1]), 1e-6 * edge[0])
-    return jnp.abs(beyond - edge[0]) / one
+    first = edge[..., :1]
+    one = jnp.maximum(jnp.abs(first - edge[..., 1:]), 1e-6 * first)
+    return jnp.abs(beyond - first) / one
 
 
 def half_way(mesh: Mesh) -> Mesh:
@@ -368,6 +385,8 @@ def _part(first: Array | np.ndarray, count: int, mesh: Mesh) -> Mesh:
 def _by_position(mesh: Mesh) -> list[Array | AbstractSpring]:
     """Everything whose last axis is that of the positions."""
     coupled: list[Array] = []
+    if mesh.coupling is not None and mesh.coupling.scale is not None:
+        coupled.append(mesh.coupling.scale)
     if mesh.coupling is not None and mesh.coupling.other is not None:
         coupled.append(mesh.coupling.other.compliance)
     return [

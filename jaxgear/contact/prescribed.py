@@ -6,7 +6,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..microgeometry import AbstractModification
-from ..numerics import Checked, Numbers, check, program, real, result, tangent_stiffness
+from ..numerics import Checked, Numbers, check, over_slices, program, real, result, tangent_stiffness
 from .face_coupling import check_torque
 from .mesh import Mesh
 from .operating_point import Torque, operating_point_of
@@ -107,7 +107,7 @@ def _solve_at(mesh: Mesh, approach: Curve, removed: RemovedMaterial, shared: Sca
     structure = mesh.structure
     if shared is not None:
         structure = structure + shared * mesh.slice_width[0] * mesh.lever[:, None] * mesh.lever[None]
-    gap = mesh.corner_gap[:, None] + removed.amount
+    gap = over_slices(mesh.corner_gap) + removed.amount
     problem, solution = contact_of(mesh, gap, removed.shift, approach=approach, compliance=structure)
     pair_force = pair_forces(mesh, solution.line_load)
     force = jnp.sum(pair_force, axis=0)
@@ -138,7 +138,7 @@ class ForcedContact(WithStatus, eqx.Module):
 @program
 def solve_forces(mesh: Mesh, force: Curve, removed: RemovedMaterial) -> ForcedContact:
     """Contact under a force on the line of action at every mesh position [N], at least zero, shape (positions,)."""
-    _, solution = contact_of(mesh, mesh.corner_gap[:, None] + removed.amount, removed.shift, load=force)
+    _, solution = contact_of(mesh, over_slices(mesh.corner_gap) + removed.amount, removed.shift, load=force)
     return ForcedContact(solution.line_load, contact_status(mesh, solution, solution.approach, removed))
 
 

@@ -18,6 +18,7 @@ from ..numerics import (
     Given,
     concrete,
     minimum,
+    over_slices,
     program,
     solve_contact,
     stored,
@@ -266,6 +267,8 @@ def contact_of(
 
 def pair_forces(mesh: Mesh, line_load: Load) -> Float[Array, "pairs positions"]:
     """Force on the line of action that every pair contributes under line loads [N/mm], in N."""
+    if mesh.lever.ndim == 3:
+        return jnp.sum(mesh.lever * line_load * mesh.slice_width[None, :, None], axis=1)
     return mesh.lever * jnp.sum(line_load * mesh.slice_width[None, :, None], axis=1)
 
 
@@ -300,20 +303,18 @@ def outermost(mesh: Mesh, removed: RemovedMaterial) -> Curve:
     amount, gain = removed.amount, _sliding_gain(mesh, removed.shift)
     edge = jnp.stack([amount[-1, :, 0], amount[0, :, -1]])
     fall = jnp.minimum(edge - jnp.stack([amount[-1, :, 1], amount[0, :, -2]]), 0.0)
-    left = (edge - 2 * gain)[..., None] + fall[..., None] * mesh.outer_steps[:, None]
+    gap, lever, steps = map(over_slices, (mesh.outer_gap, mesh.outer_lever, mesh.outer_steps))
+    left = (edge - 2 * gain)[..., None] + fall[..., None] * steps
     if mesh.support_gap is not None:
-        left = left + mesh.outer_lever[:, None] * mesh.support_gap[None, :, None]
-    left = jnp.min(left, axis=1)
-    return jnp.min(mesh.outer_gap + left / mesh.outer_lever, axis=0)
+        left = left + lever * mesh.support_gap[None, :, None]
+    return jnp.min(gap + left / lever, axis=(0, 1))
 
 
 def _sliding_gain(mesh: Mesh, shift) -> Float[Array, "2 slices"]:
     """By how much a slope lets the gap fall at the edges of the window, R s^2 / 2, the larger of two positions [um]."""
     ends = [(-1, slice(None, 2)), (0, slice(-2, None))]
-    rolls = [[side.contact_roll_length[pair, places] for side in mesh.sides] for pair, places in ends]
-    gains = [
-        500 * shift[pair, :, places] ** 2 / reduced_radius(*both)[None] for (pair, places), both in zip(ends, rolls)
-    ]
+    rolls = [[over_slices(side.contact_roll_length)[pair, :, places] for side in mesh.sides] for pair, places in ends]
+    gains = [500 * shift[pair, :, places] ** 2 / reduced_radius(*both) for (pair, places), both in zip(ends, rolls)]
     return jnp.stack([jnp.max(gain, axis=-1) for gain in gains])
 
 
@@ -321,11 +322,11 @@ def _sliding_gain(mesh: Mesh, shift) -> Float[Array, "2 slices"]:
 def _solve_removed(mesh: Mesh, torque: Scalar, removed: RemovedMaterial) -> dict[str, Array]:
     force = _force(mesh, torque)
     removed = jax.tree.map(lambda field: field.astype(force.dtype), removed)
-    gap = stored(mesh.corner_gap[:, None] + removed.amount)
+    gap = stored(over_slices(mesh.corner_gap) + removed.amount)
     problem, solution = contact_of(mesh, gap, stored(removed.shift), load=force)
     windup = mesh.hub * force / mesh.pair.face_width
     contact_stiffness = tangent_stiffness(problem, solution)
-    unloaded = minimum(problem.gap / mesh.lever[:, None], axis=(0, 1))
+    unloaded = minimum(problem.gap / problem.levers, axis=(0, 1))
     status = contact_status(mesh, solution, solution.approach, removed)
     if mesh.support_torque is not None:
         status = status_of({Status.OUT_OF_VALIDITY: ~holds_at(mesh.support_torque, torque)}, status)

@@ -14,6 +14,7 @@ from ..contact.mesh import prepare_from
 from ..contact.operating_point import Torque, operating_point_of
 from ..contact.solve import check_mesh, more_pairs_help
 from ..contact.status import Status, status_of
+from ..geometry import check_spur
 from ..microgeometry import AbstractModification
 from ..numerics import Given, check, concrete, real, whole
 from ..numerics.programs import is_eager
@@ -99,6 +100,7 @@ def force_and_mesh(
 ) -> tuple[AbstractMeshForce, Mesh]:
     """`mesh_force`, and the mesh that it was made on."""
     check_mesh("mesh_force", mesh)
+    check_spur("mesh_force", *mesh.pair.gears)
     torque = operating_point_of("mesh_force", torque, mesh.slice_width.dtype).torque
     check("mesh_force", "torque", torque, "N m", low=0.0, open_low=True)
     series = _number("compliance", compliance, "um/N", mesh, low=0.0)

@@ -5,7 +5,7 @@ from jaxtyping import Array, Float
 
 from ..compliance import IsoStiffness, iso_stiffness
 from ..contact.status import Status, Statuses, status_of
-from ..geometry import Gear, GearPair, path_of_contact
+from ..geometry import Gear, GearPair, check_spur, path_of_contact
 from ..numerics import Checked, Given, check, optional_real, program, real, result
 from ..tolerance import ToleranceClass
 
@@ -95,6 +95,7 @@ def iso_dynamic_factor(
             nitrided gears (without the standard's upper limits in um).
     """
     owner = "iso_dynamic_factor"
+    check_spur(owner, *pair.gears)
     check(owner, "torque", torque, "N m", low=0.0, open_low=True)
     check(owner, "speed", speed, "rpm", low=0.0)
     check(owner, "tip_relief", tip_relief, "um", low=0.0)

@@ -1,4 +1,4 @@
-"""Gears, their pairing, the generated tooth outline and the path of contact (external involute spur gears).
+"""Gears, their pairing, the generated tooth outline and the path of contact (external involute gears).
 
 Coordinates and signs used everywhere:
 
@@ -7,12 +7,15 @@ Coordinates and signs used everywhere:
   it stays smooth down to the base circle, where pressure angles do not;
 - `path` s is the position along the line of action from the pitch point [mm], positive towards the pinion tip (recess):
   rho_pinion = rho_C,pinion + s, rho_wheel = rho_C,wheel - s;
-- `phase` psi counts base pitches, psi = 0 with the reference pair at the pitch point: s = psi p_b.
+- `phase` psi counts base pitches, psi = 0 with the reference pair at the pitch point: s = psi p_b;
+- helical gears run in their transverse section; y from the middle of the face its contact lies y tan(beta_b) ahead on
+  the path: s = psi p_bt + y tan(beta_b).
 """
 
 from . import material as _material
 from .backlash import pair_with_backlash as pair_with_backlash
 from .gear import Gear as Gear
+from .gear import check_spur as check_spur
 from .involute import diameter as diameter
 from .involute import roll_angle as roll_angle
 from .involute import roll_length as roll_length

@@ -31,13 +31,14 @@ def pair_with_backlash(
 ) -> GearPair:
     """A pair with a given play between its unloaded, unmodified flanks, in the middle of their tolerances.
 
-    On the line of action that is the play of the centre distance, less cos(pressure angle) times both mean tooth
+    Normal to the flanks that is the play of the centre distance, less cos(normal pressure angle) times both mean tooth
     thickness allowances (ISO 21771).
 
     Args:
         pinion: driving gear.
         wheel: driven gear.
-        backlash: normal backlash j_bn, on the line of action [um].
+        backlash: normal backlash j_bn [um]: on the line of action of spur gears, there j_bn / cos(beta_b) of helical
+            ones.
         center_distance: [mm]; None for the backlash-free one of the nominal tooth thicknesses.
         axial_offset: of the middle of the wheel's face from that of the pinion's [mm].
         by: what makes the backlash: the tooth thickness of "both" gears, thinned alike, that of the "pinion" or the
@@ -54,9 +55,10 @@ def pair_with_backlash(
     if by == "center_distance":
         if distance is not None:
             raise ValueError('GearPair: center_distance: cannot be given, by = "center_distance" finds it')
-        return GearPair(pinion, wheel, _distance(pinion, wheel, backlash), axial_offset=real(axial_offset))
+        distance = _distance(pinion, wheel, backlash / jnp.cos(pinion.base_helix_angle))
+        return GearPair(pinion, wheel, distance, axial_offset=real(axial_offset))
     check("GearPair", "center_distance", distance, "mm", low=0.0, open_low=True)
-    play = _play(pinion, wheel, distance)
+    play = _play(pinion, wheel, distance) * jnp.cos(pinion.base_helix_angle)
     _check_enough(backlash, play)
     missing = backlash - play
     missing = jnp.where(missing >= -_ROUNDED, jnp.maximum(missing, 0.0), missing)

@@ -25,6 +25,9 @@ class Toothed(Protocol):
     def pressure_angle(self) -> Scalar: ...
 
     @property
+    def transverse_pressure_angle(self) -> Scalar: ...
+
+    @property
     def profile_shift(self) -> Scalar: ...
 
     @property
@@ -41,8 +44,8 @@ def involute(tangent: Real) -> Real:
 
 def half_tooth_angle(gear: Toothed, rho: Real) -> Real:
     """Angle between the tooth centreline and the involute at a roll length [mm], seen from the gear centre [rad]."""
-    alpha = jnp.deg2rad(gear.pressure_angle)
-    at_base = (jnp.pi / 2 + 2 * gear.profile_shift * jnp.tan(alpha)) / gear.teeth + involute(jnp.tan(alpha))
+    alpha, transverse = jnp.deg2rad(gear.pressure_angle), gear.transverse_pressure_angle
+    at_base = (jnp.pi / 2 + 2 * gear.profile_shift * jnp.tan(alpha)) / gear.teeth + involute(jnp.tan(transverse))
     return at_base + gear.thickness_angle - involute(rho / gear.base_radius)
 
 

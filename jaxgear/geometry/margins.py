@@ -54,7 +54,8 @@ class Margins(Checked):
             allowances; without a given centre distance that of the allowances alone.
         base_circle_clearance: centre distance minus both base radii [mm].
         face_overlap: width on which the faces overlap along the axis [mm].
-        base_pitch_difference: between pinion and wheel, relative. No margin: it must vanish.
+        base_pitch_difference: between pinion and wheel, relative, and what base helix angles miss of being opposite
+            ones [rad]. No margin: it must vanish.
         tip_overrun: by how much a tip form circle lies outside its tip circle, the larger of both gears [mm]. No
             margin: it must not be positive, and is zero without chamfers.
         accuracy: by how much clearances of the form circles and backlash may lie below zero.
@@ -129,7 +130,7 @@ def margins_between(
         backlash=play_between(first, second, None if center_distance is None else tangent),
         base_circle_clearance=distance - both,
         face_overlap=face_overlap,
-        base_pitch_difference=jnp.abs(first.base_pitch - second.base_pitch) / first.base_pitch,
+        base_pitch_difference=_apart(first, second),
         tip_overrun=-jnp.minimum(first.tip_chamfer, second.tip_chamfer),
         accuracy=Accuracy(
             pinion_form=_form_accuracy(pinion),
@@ -138,6 +139,14 @@ def margins_between(
             backlash=2e3 * _DISTANCE_ACCURACY * both * tangent,
         ),
     )
+
+
+def _apart(first: Gear, second: Gear) -> Scalar:
+    """`base_pitch_difference` of two gears."""
+    pitches = jnp.abs(first.base_pitch - second.base_pitch) / first.base_pitch
+    if first.helix_angle is None and second.helix_angle is None:
+        return pitches
+    return pitches + jnp.abs(first.base_helix_angle + second.base_helix_angle)
 
 
 def play_between(pinion: Gear, wheel: Gear, tangent: Scalar | None) -> Scalar:
@@ -181,6 +190,12 @@ def faults_between(
         for name, unit in (("module", "mm"), ("pressure_angle", "deg"))
         if float(getattr(wheel, name)) != float(getattr(pinion, name))
     ]
+    hands = [0.0 if gear.helix_angle is None else float(gear.helix_angle) for gear in (pinion, wheel)]
+    if hands[0] != -hands[1]:
+        faults.append(
+            f"GearPair: wheel helix_angle = {hands[1]:g} deg must be {0.0 - hands[0]:g} deg: gears on parallel shafts "
+            "have the same angle and opposite hands"
+        )
     missed = {name for name, holds in held.items() if not holds}
     if "base_circle_clearance" in missed:
         closest = float(pinion.base_radius + wheel.base_radius)

@@ -1,5 +1,8 @@
 """The rack-generated tooth outline: trochoid fillet joined to the involute, undercut included.
 
+Of helical gears it is that of the transverse section. There the rack's tip is an ellipse; the circle of the normal
+section stands for it, which is close enough for compliances.
+
 Tooth frame: origin in the gear centre, y along the tooth centreline, x to the side. The trochoid is the equidistant of
 the path of the rack's tip arc centre, in the parameter g, the inclination of the common normal: g = pi/2 on the root
 circle, g = pressure angle where a tooth without undercut passes into the involute.
@@ -12,7 +15,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..numerics import Checked, bracketed_root, program, result
-from .gear import Gear
+from .gear import Gear, virtual_gear
 from .involute import half_tooth_angle, involute
 
 Real = Float[Array, "..."]
@@ -71,6 +74,7 @@ class Outline(Checked):
         form_roll_length: roll length there [mm], the start of the usable involute (ISO 21771 d_Ff).
         root_half_angle: half angle subtended by the tooth at the root circle, theta_f [rad].
         undercut: 1 where the trochoid cuts the involute off above the base circle, else 0.
+        normal: of a helical gear that of its `virtual_gear`; None of a spur gear.
     """
 
     gear: Gear
@@ -79,6 +83,7 @@ class Outline(Checked):
     form_roll_length: Scalar = result("mm")
     root_half_angle: Scalar = result("rad")
     undercut: Scalar = result()
+    normal: "Outline | None" = eqx.field(default=None, repr=False)
 
     @property
     def junction_height(self) -> Scalar:
@@ -98,13 +103,13 @@ class Outline(Checked):
 
 @program
 def outline(gear: Gear) -> Outline:
-    """Generates the outline of one gear.
+    """Generates the outline of one gear, in the transverse section.
 
     Equations: the trochoid of the rack's tip arc in the frame of the tooth centreline, as in ISO 6336-3 (tool tip
         centre
     E) written as a curve; its junction angle equals the involute's half tooth angle at d_Ff (ISO 21771).
     """
-    alpha, drawn = jnp.deg2rad(gear.pressure_angle), curves(gear)
+    alpha, drawn = gear.transverse_pressure_angle, curves(gear)
     end_x, end_y = drawn.trochoid(jnp.full_like(alpha, jnp.pi / 2))
     tangential = _tangential_form_roll_length(gear)
     # at the limit of undercut both junctions lie on the base circle; rounding must not choose between them
@@ -114,7 +119,8 @@ def outline(gear: Gear) -> Outline:
     x, y = drawn.trochoid(cut)
     rho_cut = jnp.sqrt(jnp.maximum(x**2 + y**2 - gear.base_radius**2, (1e-6 * gear.base_radius) ** 2))
     form = jnp.where(undercut, rho_cut, jnp.maximum(tangential, 0.0))
-    return Outline(gear, drawn, junction, form, jnp.arctan2(end_x, end_y), undercut.astype(form.dtype))
+    normal = None if gear.helix_angle is None else outline(virtual_gear(gear))
+    return Outline(gear, drawn, junction, form, jnp.arctan2(end_x, end_y), undercut.astype(form.dtype), normal)
 
 
 def curves(gear: Gear) -> Curves:
@@ -125,10 +131,10 @@ def curves(gear: Gear) -> Curves:
 
 def rack_tip(gear: Gear) -> tuple[Scalar, Scalar, Scalar]:
     """Centre of the rack's tip arc: distance from the tooth centreline [mm], depth below the pitch line, and radius."""
-    alpha, m = jnp.deg2rad(gear.pressure_angle), gear.module
+    alpha, m, pitch = gear.transverse_pressure_angle, gear.module, jnp.pi * gear.transverse_module
     tip = gear.root_radius * m
-    from_rack_centre = jnp.pi * m / 4 - gear.dedendum * m * jnp.tan(alpha) - (1 - jnp.sin(alpha)) * tip / jnp.cos(alpha)
-    from_centreline = jnp.pi * m / 2 - from_rack_centre + gear.pitch_radius * gear.thickness_angle
+    from_rack_centre = pitch / 4 - gear.dedendum * m * jnp.tan(alpha) - (1 - jnp.sin(alpha)) * tip / jnp.cos(alpha)
+    from_centreline = pitch / 2 - from_rack_centre + gear.pitch_radius * gear.thickness_angle
     return from_centreline, (gear.dedendum - gear.profile_shift) * m - tip, tip
 
 
@@ -144,7 +150,7 @@ def involute_point(gear: Gear, rho: Real) -> tuple[Real, Real]:
 
 def _tangential_form_roll_length(gear: Gear) -> Scalar:
     """Roll length of the junction at g = pressure angle [mm]; negative where the tooth is undercut."""
-    alpha = jnp.deg2rad(gear.pressure_angle)
+    alpha = gear.transverse_pressure_angle
     straight = gear.dedendum - gear.profile_shift - gear.root_radius * (1 - jnp.sin(alpha))
     return gear.pitch_radius * jnp.sin(alpha) - straight * gear.module / jnp.sin(alpha)
 

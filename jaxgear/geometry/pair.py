@@ -30,9 +30,10 @@ class GearPair(Checked):
             coordinates [mm].
 
     Raises:
-        ValueError: for gears that do not share module or pressure angle, an impossible centre distance, a contact ratio
-            below 1, a tip that touches the mate's flank below its form circle or the mate's root circle, faces that do
-            not overlap: the first of what `explain` lists. Pairs made while being traced pass; their `margins` tell.
+        ValueError: for gears that do not share module or pressure angle, helical gears of the same hand, an impossible
+            centre distance, a contact ratio below 1, a tip that touches the mate's flank below its form circle or the
+            mate's root circle, faces that do not overlap: the first of what `explain` lists. Pairs made while being
+            traced pass; their `margins` tell.
     """
 
     pinion: Gear
@@ -63,8 +64,9 @@ class GearPair(Checked):
 
     @property
     def backlash(self) -> Scalar:
-        """Play between the unloaded, unmodified flanks on the line of action [um]: that of the centre distance, and
-        cos(pressure angle) times what the mean tooth thickness allowances take off both teeth.
+        """Play between the unloaded, unmodified flanks on the transverse line of action [um], j_bt: that of the centre
+        distance, and what the mean tooth thickness allowances take off both teeth. Normal to the flanks it is
+        cos(beta_b) times this.
         """
         return margins(self).backlash
 
@@ -72,7 +74,7 @@ class GearPair(Checked):
     def backlash_limits(self) -> Float[Array, "*pairs 2"]:
         """Least and largest backlash within the tolerances of the tooth thickness [um], shape (2,)."""
         tolerances = self.pinion.tooth_thickness_tolerance + self.wheel.tooth_thickness_tolerance
-        half = 0.5 * jnp.cos(jnp.deg2rad(self.pinion.pressure_angle)) * tolerances
+        half = 0.5 * jnp.cos(self.pinion.transverse_pressure_angle) / self.pinion.helix_cosine * tolerances
         return jnp.stack([self.backlash - half, self.backlash + half], axis=-1)
 
     @property
@@ -124,8 +126,27 @@ class GearPair(Checked):
 
     @property
     def base_pitch(self) -> Real:
-        """[mm]"""
+        """Transverse base pitch p_bt [mm]."""
         return self.pinion.base_pitch
+
+    @property
+    def is_spur(self) -> bool:
+        """Whether both gears are known to be spur gears."""
+        return all(gear.is_spur for gear in self.gears)
+
+    @property
+    def path_slope(self) -> Real:
+        """tan(beta_b), by which contacts lie ahead on the line of action per face coordinate.
+
+        Positive face coordinates enter the mesh first where the pinion has a right hand: it turns counterclockwise seen
+        from the positive end of the face. On the other flanks, or turning the other way, face coordinates change sign.
+        """
+        return jnp.tan(self.pinion.base_helix_angle)
+
+    @property
+    def overlap_ratio(self) -> Real:
+        """eps_beta = b |tan(beta_b)| / p_bt (ISO 21771), over the common face."""
+        return self.face_width * jnp.abs(self.path_slope) / self.base_pitch
 
     @property
     def gear_ratio(self) -> Real:

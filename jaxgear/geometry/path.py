@@ -87,10 +87,10 @@ def pressure_angle_of(target: Real) -> Real:
 
 
 def backlash_free_involute(pinion: Gear, wheel: Gear) -> Real:
-    """inv(alpha_w) = inv(alpha) + 2 tan(alpha) (x1 + x2) / (z1 + z2) [rad] (ISO 21771)."""
+    """inv(alpha_wt) = inv(alpha_t) + 2 tan(alpha_n) (x1 + x2) / (z1 + z2) [rad] (ISO 21771)."""
     tangent = jnp.tan(jnp.deg2rad(pinion.pressure_angle))
     shift = (pinion.profile_shift + wheel.profile_shift) / (pinion.teeth + wheel.teeth)
-    return involute(tangent) + 2 * tangent * shift
+    return involute(jnp.tan(pinion.transverse_pressure_angle)) + 2 * tangent * shift
 
 
 def _missing_involute(tangent: Real, wanted: Real) -> Real:

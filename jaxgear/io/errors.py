@@ -140,7 +140,7 @@ def suggestion(name: object, valid: Iterable[str]) -> str:
     names = sorted(valid)
     plain = str(name).replace("_", "").lower()
     if plain in _OF_HELICAL_GEARS and "teeth" in names:
-        return "the gears are spur gears"
+        return "design files know spur gears: solve helical ones with the library"
     meant = [key for key, symbols in _SYMBOLS.items() if key in names and plain.rstrip("12") in symbols.split()]
     near = meant or difflib.get_close_matches(str(name), names, n=1, cutoff=0.5)
     if near:

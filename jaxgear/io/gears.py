@@ -21,7 +21,7 @@ _THICKNESS = ("span", "over_balls", "tooth_thickness_allowance", "tooth_thicknes
 _WITHOUT_FLANKS = "modification", "quality_class"
 
 _ThicknessKeys = section_of(ToothThickness, most=(("teeth_spanned", 1000),))
-_GearKeys = section_of(Gear, ("material", "tooth_thickness_allowance"))
+_GearKeys = section_of(Gear, ("material", "tooth_thickness_allowance", "helix_angle"))  # commands know spur gears
 
 _BACKLASH = Number("um", low=0.0)
 MATERIAL = either(text(), described(Material), "the name of a material, or a table")
@@ -107,7 +107,7 @@ def fixed_gear(section: GearSection, materials: Materials) -> Gear:
 
 def gear_part(section: GearSection, materials: Materials) -> Part:
     """A gear without its modifications."""
-    gear, measures = part_of(section, Gear, without=("material",)), part_of(section, ToothThickness)
+    gear, measures = part_of(section, Gear, without=("material", "helix_angle")), part_of(section, ToothThickness)
     if section.material is not None:
         gear = gear.having(material=_material(f"{section.at}.material", section.material, materials))
     gear = gear.having(**measures.fields)

@@ -12,7 +12,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from ..geometry import Gear, outline
+from ..geometry import Gear, check_spur, outline
 from ..geometry.involute import involute
 from ..numerics import Checked, Given, Numbers, bracketed_root, check, concrete, count, fields_of, number, real, whole
 
@@ -28,6 +28,7 @@ def teeth_spanned(gear: Gear) -> int:
     The anvils then touch nearest to the diameter d + 2 x m, where tan(alpha_v) = sqrt((d + 2 x m)^2 - d_b^2) / d_b:
     k = z / pi (tan(alpha_v) - inv(alpha)) - 2 x tan(alpha) / pi + 0.5, rounded, and at least 2.
     """
+    check_spur("teeth_spanned", gear)
     return int(_teeth_spanned(gear))
 
 
@@ -51,6 +52,7 @@ def span(gear: Gear, teeth: int) -> Scalar:
     Raises:
         ValueError: unless k is a whole number from 1 to the number of teeth, or where the anvils miss the involute.
     """
+    check_spur("span", gear)
     most = concrete(gear.teeth)
     whole("span", "teeth", teeth, 1, float("inf") if most is None else float(most))
     found = _span(gear, teeth)
@@ -79,6 +81,7 @@ def over_balls(gear: Gear, ball: Given) -> Scalar:
     Raises:
         ValueError: for a ball that falls onto the root circle, does not stand out of the spaces or misses the involute.
     """
+    check_spur("over_balls", gear)
     check("over_balls", "ball", ball, "mm", low=0.0, open_low=True)
     wanted, radius, touched = _ball(gear, ball)
     _check_ball(gear, ball, wanted, radius)
@@ -118,6 +121,7 @@ def measures(gear: Gear, teeth: Given | None = None, ball: Given | None = None) 
         teeth: k; None for `teeth_spanned`.
         ball: D_M [mm]; None for 1.7 modules.
     """
+    check_spur("measures", gear)
     teeth = _teeth_spanned(gear) if teeth is None else real(teeth)
     ball = _USUAL_BALL * gear.module if ball is None else real(ball)
     first, (wanted, centre, touched) = _span(gear, teeth), _ball(gear, ball)
@@ -163,6 +167,7 @@ def allowance_of_balls(gear: Gear, ball: Given, measured: Numbers) -> Float[Arra
     """
     check("allowance_of_balls", "ball", ball, "mm", low=0.0, open_low=True)
     measured = real(measured)
+    check_spur("allowance_of_balls", gear)
     ratio = (measured - ball) / (2 * gear.base_radius * _offset(gear))
     least = concrete(2 * gear.base_radius * _offset(gear) + ball)
     check("allowance_of_balls", "measured", measured, "mm", low=None if least is None else float(least), open_low=True)

@@ -12,7 +12,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..contact import MeshCycle, Side
-from ..geometry import outline
+from ..geometry import check_spur, outline
 from ..metrics import Quantity, Vocabulary, gear_volume, removed_at
 from ..microgeometry import AbstractCurve, AbstractModification, Linear, NoModification, Quadratic, TipRelief
 from ..numerics import Given, check, concrete, program, real, safe_divide
@@ -88,6 +88,7 @@ def ground_area(side: Side) -> Scalar:
 
     2 z b (L_tip^2 - L_form^2) / (2 r_b): the volume of any grinding stock is its thickness times this.
     """
+    check_spur("ground_area", side.gear)
     form, tip = outline(side.gear).form_roll_length, side.tip_roll_length
     return 2 * side.gear.teeth * side.face_width * (tip**2 - form**2) / (2 * side.base_radius)
 

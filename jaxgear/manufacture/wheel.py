@@ -16,7 +16,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..contact import Side
-from ..geometry import outline
+from ..geometry import check_spur, outline
 from ..geometry.involute import load_angle
 from ..metrics import removed_at
 from ..microgeometry import AbstractModification
@@ -78,6 +78,7 @@ def space_point(
 ) -> tuple[Float[Array, "..."], ...]:
     """x, y [mm] and inclination [rad] of points of the flank with so much material removed [um]."""
     gear = side.gear
+    check_spur("a form wheel, which touches a helical flank in a curve of space", gear)
     base = jnp.broadcast_to(gear.base_radius, roll_length.shape)
     angle = jnp.pi / gear.teeth + load_angle(gear, roll_length)
     left = roll_length - 1e-3 * removed

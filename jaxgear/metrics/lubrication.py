@@ -9,7 +9,7 @@ from jaxtyping import Array, Float
 
 from ..compliance.plane import combined_modulus
 from ..contact import MeshCycle
-from ..geometry import GearPair, path_of_contact, reduced_radius
+from ..geometry import GearPair, check_spur, path_of_contact, reduced_radius
 from ..numerics import Given, check, over_batch, real, safe_divide, safe_power, safe_sqrt
 from .lubricant import Lubricant
 
@@ -91,6 +91,7 @@ def ohlendorf_loss_factor(pair: GearPair) -> Scalar:
         H. Ohlendorf, Verlustleistung und Erwaermung von Stirnraedern, TH Muenchen 1958; G. Niemann, H. Winter,
         Maschinenelemente II.
     """
+    check_spur("ohlendorf_loss_factor", *pair.gears)
     path = path_of_contact(pair)
     recess, approach = path.end / path.base_pitch, -path.start / path.base_pitch
     ratio = pair.gear_ratio
@@ -130,6 +131,7 @@ def friction_coefficient(cycle: MeshCycle, lubricant: Lubricant) -> Scalar:
         L. Schlenk, Untersuchungen zur Fresstragfaehigkeit von Grosszahnraedern, TU Muenchen 1994; ISO/TR 13989-1
         (ISO/TS 6336-20); ISO/TR 15144-1 (ISO/TS 6336-22).
     """
+    check_spur("friction_coefficient", *cycle.kinematics.pair.gears)
     if cycle.operating_point.friction is not None:
         return cycle.operating_point.friction
     speed = _running("friction_coefficient", cycle)

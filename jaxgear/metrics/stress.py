@@ -21,7 +21,7 @@ from jaxtyping import Array, Float
 
 from ..compliance.plane import combined_modulus
 from ..contact import MeshCycle, Side
-from ..geometry import Gear, GearPair, path_of_contact
+from ..geometry import Gear, GearPair, check_spur, path_of_contact
 from ..geometry.involute import load_angle
 from ..geometry.outline import rack_tip
 from ..numerics import Checked, over_batch, result, safe_sqrt
@@ -81,6 +81,7 @@ class ContactFactors(NamedTuple):
 
 def contact_factor_squares(pair: GearPair) -> ContactFactors:
     """The factors of `nominal_contact_stress` that belong to a pair, whatever its load."""
+    check_spur("nominal_contact_stress", *pair.gears)
     contact = path_of_contact(pair)
     pitch = contact.reduced_radius(jnp.zeros(()))
     inner, outer = (pitch / contact.reduced_radius(single) for single in (contact.inner_single, contact.outer_single))
@@ -141,6 +142,7 @@ class NominalRootStress(Checked):
 
 def critical_section(gear: Gear) -> CriticalSection:
     """Section of the generated root at the 30 degree tangent (external spur gear)."""
+    check_spur("root_stress", gear)
     m, z = gear.module, gear.teeth
     offset, below, radius = (length / m for length in rack_tip(gear))
     g, h = -below, 2 / z * offset - jnp.pi / 3

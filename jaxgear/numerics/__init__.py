@@ -20,6 +20,7 @@ from .coupling import SliceCoupling as SliceCoupling
 from .dense import positive_definite as positive_definite
 from .dense import pseudo_inverse as pseudo_inverse
 from .dense import solve_dense as solve_dense
+from .elimination import over_slices as over_slices
 from .fields import Checked as Checked
 from .fields import Number as Number
 from .fields import Usual as Usual

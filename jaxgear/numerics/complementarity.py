@@ -90,9 +90,9 @@ def solve_contact(problem: ContactProblem, *, steps: int, tolerance: float | Non
     """
     # a gap common to all springs only shifts the approach: without it light loads lose no digits to wide gaps
     tolerance = _TOLERANCE[problem.gap.dtype] if tolerance is None else tolerance
-    closing = problem.gap / problem.lever[:, None]
+    closing = problem.gap / problem.levers
     common = jax.lax.stop_gradient(jnp.min(closing, axis=(0, 1)))
-    problem = eqx.tree_at(lambda p: p.gap, problem, problem.lever[:, None] * (closing - common[None, None]))
+    problem = eqx.tree_at(lambda p: p.gap, problem, problem.levers * (closing - common[None, None]))
     if problem.approach is not None:
         problem = eqx.tree_at(lambda p: p.approach, problem, problem.approach - common)
     v, approach, residual = _solve(steps, tolerance, problem, common)
@@ -142,7 +142,7 @@ def _near(problem: ContactProblem) -> tuple[Rows, Curve]:
         exact = secants_under(problem, load)
         return _newton(problem, state[0], exact, slopes_under(problem, load, exact))
 
-    state = v, jnp.zeros_like(problem.lever[0])
+    state = v, jnp.zeros_like(problem.gap[0, 0])
     if problem.coupling is None:
         state = jax.lax.fori_loop(0, _SECANT_STEPS, lambda _, s: _newton(problem, s[0], secant, secant), state)
         state = jax.lax.fori_loop(0, _LOGARITHM_STEPS, lambda _, s: with_logarithms(s, rate), state)
@@ -227,24 +227,25 @@ def _start(problem: ContactProblem) -> tuple[Rows, Slopes, Slopes]:
     if problem.load is None:
         return _start_at(problem)
     even = problem.load / jnp.sum(problem.weight)
-    loads = [jnp.broadcast_to(even, lever[None].shape) for lever in problem.lever]
+    loads = [jnp.broadcast_to(even, lever.shape) for lever in problem.levers]
     secant = secants_under(problem, loads)
     # gaps wider than the approach of any one spring that bears the load alone stay open
     alone = [
-        jnp.max(gap + (c + problem.compliance[i, i][None]) * load, axis=0) / lever
-        for i, (gap, c, lever, load) in enumerate(zip(problem.gap, secant, problem.lever, loads))
+        jnp.max((gap + (c + own) * load) / lever, axis=0)
+        for gap, c, own, lever, load in zip(problem.gap, secant, problem.own_compliance, problem.levers, loads)
     ]
     bound = jnp.min(jnp.stack(alone), axis=0)
-    return [(lever * bound)[None] - gap for lever, gap in zip(problem.lever, problem.gap)], loads, secant
+    return [lever * bound[None] - gap for lever, gap in zip(problem.levers, problem.gap)], loads, secant
 
 
 def _start_at(problem: ContactProblem) -> tuple[Rows, Slopes, Slopes]:
     """Contact wherever the approach closes the gap, the loads of every spring on its own, and their secants."""
-    closed = [(lever * problem.approach)[None] - gap for lever, gap in zip(problem.lever, problem.gap)]
+    assert problem.approach is not None
+    closed = [lever * problem.approach[None] - gap for lever, gap in zip(problem.levers, problem.gap)]
     load = [jnp.ones_like(row) for row in closed]
     for _ in range(_OWN_STEPS):
         secant = secants_under(problem, load)
-        load = [row / (c + problem.compliance[i, i][None]) for i, (row, c) in enumerate(zip(closed, secant))]
+        load = [row / (c + own) for row, c, own in zip(closed, secant, problem.own_compliance)]
     return closed, load, secants_under(problem, load)
 
 
@@ -282,12 +283,12 @@ def _residual(problem: ContactProblem, load: Rows, approach: Curve, secant: Slop
     load below which springs are linear.
     """
     worst, scale, softest = jnp.zeros_like(approach), jnp.abs(common), jnp.zeros_like(approach)
-    for i, (q, y, c, lever) in enumerate(zip(load, left, secant, problem.lever)):
+    for q, y, c, lever, own in zip(load, left, secant, problem.levers, problem.own_compliance):
         mismatch = y + c * q
-        closing = jnp.abs(mismatch + (lever * approach)[None])
+        closing = jnp.abs(mismatch + lever * approach[None])
         worst = jnp.maximum(worst, jnp.max(jnp.where(q > 0, jnp.abs(mismatch), -mismatch), axis=0))
         scale = jnp.maximum(scale, jnp.max(jnp.where(q > 0, closing, 0.0), axis=0))
-        softest = jnp.maximum(softest, problem.compliance[i, i] + jnp.max(c, axis=0))
+        softest = jnp.maximum(softest, jnp.max(own + c, axis=0))
     eps = jnp.finfo(worst.dtype).eps
     violation = worst / (scale + eps * LOAD_FLOOR * softest)
     if problem.load is None:

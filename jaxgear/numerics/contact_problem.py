@@ -13,7 +13,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
 from .coupling import SliceCoupling
-from .elimination import Rows, Slopes
+from .elimination import Rows, Slopes, over_slices
 
 Real = Float[Array, "..."]
 
@@ -22,7 +22,7 @@ LOAD_FLOOR = 1e-2
 
 
 class AbstractSpring(eqx.Module):
-    """A deflection that increases with the load, elementwise; every leaf has shape (pairs, 1, positions)."""
+    """A deflection that increases with the load, elementwise; every leaf has shape (pairs, 1 or slices, positions)."""
 
     @abstractmethod
     def secant(self, load: Real) -> Real:
@@ -45,10 +45,12 @@ class ContactProblem(eqx.Module):
     """Data of the contact problem.
 
     Attributes:
-        compliance: C, shape (pairs, pairs, positions).
+        compliance: C, shape (pairs, pairs, positions); or of every slice, (pairs, pairs, slices, positions), where
+            slices are not coupled.
         law: h(q) of every spring.
         gap: shape (pairs, slices, positions).
-        lever: what a spring closes per unit of common approach, positive, shape (pairs, positions).
+        lever: what a spring closes per unit of common approach, positive, shape (pairs, positions) or (pairs, slices,
+            positions).
         weight: width of each slice, shape (slices,).
         load: total load, scalar or shape (positions,); None where the approach is prescribed.
         approach: prescribed common approach d, shape (positions,); None where the load is.
@@ -61,10 +63,10 @@ class ContactProblem(eqx.Module):
         ValueError: unless one of load and approach is given.
     """
 
-    compliance: Float[Array, "pairs pairs positions"]
+    compliance: Float[Array, "pairs pairs *own positions"]
     law: AbstractSpring
     gap: Float[Array, "pairs slices positions"]
-    lever: Float[Array, "pairs positions"]
+    lever: Float[Array, "pairs *each positions"]
     weight: Float[Array, " slices"]
     load: Float[Array, ""] | Float[Array, " positions"] | None = None
     approach: Float[Array, " positions"] | None = None
@@ -74,6 +76,17 @@ class ContactProblem(eqx.Module):
     def __check_init__(self) -> None:
         if (self.load is None) == (self.approach is None):
             raise ValueError("ContactProblem: one of load and approach must be given")
+
+    @property
+    def levers(self) -> Float[Array, "pairs #slices positions"]:
+        """Of every spring, with an axis of slices."""
+        return over_slices(self.lever)
+
+    @property
+    def own_compliance(self) -> Float[Array, "pairs #slices positions"]:
+        """C of every spring on its own."""
+        own = over_slices(jnp.stack([self.compliance[i, i] for i in range(len(self.compliance))]))
+        return own if self.coupling is None or self.coupling.scale is None else own * self.coupling.scale**2
 
 
 class ContactSolution(eqx.Module):

@@ -5,7 +5,19 @@ import jax.numpy as jnp
 
 from .contact_problem import ContactProblem
 from .coupling import CoupledFactors, Response, couple, respond, stiffness, with_inverses
-from .elimination import Active, Curve, Factors, Load, Rows, Slopes, at_approach, balance, factorize, product
+from .elimination import (
+    Active,
+    Curve,
+    Factors,
+    Load,
+    Rows,
+    Slopes,
+    at_approach,
+    balance,
+    factorize,
+    over_slices,
+    product,
+)
 
 
 def eliminable(problem: ContactProblem) -> ContactProblem:
@@ -70,7 +82,7 @@ def correction(
         left: `opening` before.
         missing: load that is still missing; None where the approach is prescribed.
     """
-    approach = None if missing is not None else jnp.zeros_like(problem.lever[0])
+    approach = None if missing is not None else jnp.zeros_like(problem.gap[0, 0])
     found = respond(problem.weight, factors, known, load=missing, approach=approach)
     return found.load, found.approach, _left(factors, found, left)
 
@@ -79,8 +91,8 @@ def _left(factors: CoupledFactors, found: Response, gap: Rows) -> Rows:
     held = factors.coupling.held
     assert held is not None  # whoever eliminates gives the inverses
     return [
-        sum(c[None] * q for c, q in zip(row, found.load)) + start - pressed
-        for row, start, pressed in zip(held.local, gap, found.pressed)
+        sum(c * q for c, q in zip(row, found.load)) + start - pressed
+        for row, start, pressed in zip(held.local_slices, gap, found.pressed)
     ]
 
 
@@ -100,13 +112,15 @@ def without_gap(problem: ContactProblem, load: Rows, approach: Curve) -> Rows:
     """The same without the gap."""
     if problem.coupling is not None:
         deflected = problem.coupling.deflection(problem.compliance, problem.lever, load)
-        return [row - (lever * approach)[None] for row, lever in zip(deflected, problem.lever)]
+        return [row - lever * approach[None] for row, lever in zip(deflected, problem.levers)]
     result = []
-    for row, lever in zip(problem.compliance, problem.lever):
-        result.append(sum(c[None] * q for c, q in zip(row, load)) - (lever * approach)[None])
+    for row, lever in zip(problem.compliance, problem.levers):
+        result.append(sum(c * q for c, q in zip(over_slices(row), load)) - lever * approach[None])
     return result
 
 
 def total(problem: ContactProblem, load: Rows) -> Curve:
     """The load that line loads make."""
+    if problem.lever.ndim == 3:
+        return jnp.sum(problem.weight[None, :, None] * problem.lever * jnp.stack(load), axis=(0, 1))
     return sum(lever * jnp.sum(problem.weight[:, None] * q, axis=0) for lever, q in zip(problem.lever, load))

@@ -33,18 +33,19 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from .dense import solve_dense
-from .elimination import Curve, Factors, Load, Rows, Slopes, inverse_of, small_inverse
+from .elimination import Curve, Factors, Load, Rows, Slopes, inverse_of, over_slices, small_inverse
 from .safe import stored, unit
 
-Springs = Float[Array, "pairs pairs positions"]
+Springs = Float[Array, "pairs pairs *own positions"]
 Blocks = Float[Array, "modes modes pairs pairs positions"]
+Levers = Float[Array, "pairs *each positions"]
 
 
 class Held(NamedTuple):
     """What an elimination needs besides the coupling itself.
 
     Attributes:
-        local: rest C.
+        local: rest C; of every slice where they are scaled.
         inverse: of C.
         share_inverse: of M.
         modal: inverse of M x C where a second body feels loads otherwise; None without one.
@@ -54,6 +55,11 @@ class Held(NamedTuple):
     inverse: Springs
     share_inverse: Float[Array, "modes modes"]
     modal: Blocks | None = None
+
+    @property
+    def local_slices(self) -> Float[Array, "pairs pairs #slices positions"]:
+        """`local` with an axis of slices."""
+        return self.local if self.local.ndim == 4 else self.local[:, :, None]
 
     def column(self, mode: int) -> Float[Array, "rows pairs pairs positions"]:
         """Inverse of M x C in the columns of a mode, from the rows of this mode on."""
@@ -86,6 +92,8 @@ class SliceCoupling(eqx.Module):
         support: H, symmetric and positive semi-definite, the deflection under line loads; None without a support.
         other: of two bodies that spread loads in their own way each; None where both do alike.
         weight: w of the slices, over their mean; None where all are equal.
+        scale: D, of loads and deflections of every spring, where a body is stiffer at one place than at another: D C D
+            stands for C; None where it is not.
         held: for eliminations, see `with_inverses`; None before.
     """
 
@@ -96,16 +104,23 @@ class SliceCoupling(eqx.Module):
     support: Float[Array, "bends bends"] | None = None
     other: Other | None = None
     weight: Float[Array, " slices"] | None = None
+    scale: Float[Array, "pairs slices positions"] | None = None
     held: Held | None = None
 
-    def deflection(self, compliance: Springs, lever: Float[Array, "pairs positions"], load: Rows) -> Rows:
+    def deflection(self, compliance: Springs, lever: Levers, load: Rows) -> Rows:
         """y under line loads."""
-        result = self._spread(compliance, self.share, self.rest, load)
+        scaled = self.scaled(load)
+        result = self._spread(compliance, self.share, self.rest, scaled)
         if self.other is not None:
-            more = self._spread(self.other.compliance, self.other.share, self.other.rest, load)
+            more = self._spread(self.other.compliance, self.other.share, self.other.rest, scaled)
             result = [row + added for row, added in zip(result, more)]
+        result = self.scaled(result)
         bent = self.support_deflection(lever, load)
-        return result if bent is None else [row + height[None] * bent for row, height in zip(result, lever)]
+        return result if bent is None else [row + height * bent for row, height in zip(result, over_slices(lever))]
+
+    def scaled(self, rows: Rows) -> Rows:
+        """Rows of the springs times their scale."""
+        return rows if self.scale is None else [d * row for d, row in zip(self.scale, rows)]
 
     def _spread(self, compliance: Springs, share: Float[Array, "modes modes"], rest, load: Rows) -> Rows:
         uniform = [stored(sum(c[None] * q for c, q in zip(row, load))) for row in compliance]
@@ -117,13 +132,11 @@ class SliceCoupling(eqx.Module):
         """w times values of the slices."""
         return row if self.weight is None else self.weight[:, None] * row
 
-    def support_deflection(
-        self, lever: Float[Array, "pairs positions"], load: Rows
-    ) -> Float[Array, "slices positions"] | None:
+    def support_deflection(self, lever: Levers, load: Rows) -> Float[Array, "slices positions"] | None:
         """Deflection of the support under line loads, per unit of lever; None without a support."""
         if self.support is None or self.support_modes is None:
             return None
-        force = self.weighted(sum(height[None] * q for height, q in zip(lever, load)))
+        force = self.weighted(sum(height * q for height, q in zip(over_slices(lever), load)))
         return along(self.support_modes, along(self.support, onto(self.support_modes, force)))
 
 
@@ -135,6 +148,9 @@ def with_inverses(coupling: SliceCoupling, compliance: Springs) -> SliceCoupling
         other = coupling.other
         both = _blocks(coupling.share, compliance) + _blocks(other.share, other.compliance)
         held = held._replace(local=held.local + other.rest * other.compliance, modal=_block_inverse(both))
+    if coupling.scale is not None:
+        of_slices = coupling.scale[:, None] * coupling.scale[None]
+        held = held._replace(local=held.local[:, :, None] * of_slices)
     return eqx.tree_at(lambda c: c.held, coupling, held, is_leaf=lambda leaf: leaf is None)
 
 
@@ -176,7 +192,6 @@ def _outer(weight: Float[Array, " modes"], row: Float[Array, "... positions"]) -
     return weight.reshape(-1, *[1] * row.ndim) * row[None]
 
 
-Levers = Float[Array, "pairs positions"]
 Bends = Float[Array, "bends positions"]
 Inverse = list[list[Float[Array, "slices positions"]]]  # of every slice on its own, by springs
 Sides = Float[Array, "sides pairs positions"]  # right sides of the modal system, of one mode
@@ -239,13 +254,20 @@ def couple(coupling: SliceCoupling, lever: Levers, own: Factors) -> CoupledFacto
     inverse = inverse_of(own)
     if coupling.weight is not None:
         inverse = [[coupling.weighted(x) for x in row] for row in inverse]
-    modal = _products(coupling.modes, inverse)
+    modal = _products(coupling.modes, _scaled_both(coupling, inverse))
     blocks = _eliminated(coupling, modal)
     right, force = _of_support(coupling, lever, inverse, modal)
     bent = _ahead(blocks, right)
     force = force - _joined(bent[0], bent[1])
     yielding = _yielding(coupling.support, force)
     return CoupledFactors(coupling, lever, inverse, blocks, bent, force, yielding, own.per_slope)
+
+
+def _scaled_both(coupling: SliceCoupling, inverse: Inverse) -> Inverse:
+    """D inverse D, with the scales of the springs."""
+    if coupling.scale is None:
+        return inverse
+    return [[d * x * other for x, other in zip(row, coupling.scale)] for d, row in zip(coupling.scale, inverse)]
 
 
 def _products(modes: Float[Array, "slices modes"], rows: Inverse) -> list[Float[Array, "_ pairs pairs positions"]]:
@@ -283,14 +305,17 @@ def _of_support(
     coupling: SliceCoupling, lever: Levers, inverse, modal
 ) -> tuple[list[Sides], Float[Array, "bends bends positions"]]:
     """V^T A^-1 X by mode, and X^T A^-1 X."""
-    if coupling.support_modes is None:
+    shapes = coupling.support_modes
+    if shapes is None and coupling.scale is None:
         # what the common approach presses is the first mode
         even = reduce(add, [modal[0][:, :, i] * height[None, None] for i, height in enumerate(lever)])
         return list(even[:, None]), reduce(add, list(even[0] * lever))[None, None]
-    shapes = coupling.support_modes
-    pressed = jnp.stack([sum(x * height[None] for x, height in zip(row, lever)) for row in inverse])
-    right = [onto(mode[:, None] * shapes, pressed) for mode in coupling.modes.T]
-    force = jnp.sum(pressed * lever[:, None], axis=0)
+    heights = over_slices(lever)
+    shapes = _constant(coupling) if shapes is None else shapes
+    pressed = jnp.stack([sum(x * height for x, height in zip(row, heights)) for row in inverse])
+    modal_pressed = jnp.stack(coupling.scaled(list(pressed)))
+    right = [onto(mode[:, None] * shapes, modal_pressed) for mode in coupling.modes.T]
+    force = jnp.sum(pressed * heights, axis=0)
     return right, jnp.stack([onto(shape[:, None] * shapes, force) for shape in shapes.T])
 
 
@@ -337,28 +362,35 @@ def respond(
     approach: Curve | None = None,
 ) -> Response:
     """Solves for a load or for an approach; see the top."""
-    coupling, count = factors.coupling, len(weight)
+    coupling = factors.coupling
     inside = [sum(x * row for x, row in zip(rows, known)) for rows in factors.inverse]  # A^-1 known
     kept = unit(factors.inverse[0][0])
-    inside = [row / kept for row in inside]
-    stacked = jnp.stack(inside)
+    within = [row / kept for row in inside]
+    stacked = jnp.stack(coupling.scaled(within))
     # mode by mode: compilers take a sum for all modes in every loop that reads one of them
     _, divided = _ahead(factors.blocks, [onto(mode[:, None], stacked) for mode in coupling.modes.T])
-    force = sum(height[None] * row for height, row in zip(factors.lever, inside))
-    constant = jnp.full((count, 1), count**-0.5, force.dtype)
-    shapes = constant if coupling.support_modes is None else coupling.support_modes
+    heights = over_slices(factors.lever)
+    force = sum(height * row for height, row in zip(heights, within))
+    shapes = _constant(coupling) if coupling.support_modes is None else coupling.support_modes
     carried = onto(shapes, force) - _joined(factors.bent[0], divided)[:, 0]
     mean = weight[0] if coupling.weight is None else weight[0] / coupling.weight[0]
     bends, approach = _bends(factors, carried, None if load is None else load / mean, approach)
     eliminated = [a[0] + jnp.sum(b * bends[:, None], axis=0) for a, b in zip(divided, factors.bent[1])]
     deflected = along(coupling.modes, jnp.stack(_back(factors.blocks, eliminated)))
     even = along(shapes, bends)
-    pressed = [height[None] * even - deflected[:, i] for i, height in enumerate(factors.lever)]
+    yielded = coupling.scaled([deflected[:, i] for i in range(len(heights))])
+    pressed = [height * even - back for height, back in zip(heights, yielded)]
     pressed = [row / kept for row in pressed]
-    loads = [row + sum(x * value for x, value in zip(rows, pressed)) for row, rows in zip(inside, factors.inverse)]
+    loads = [row + sum(x * value for x, value in zip(rows, pressed)) for row, rows in zip(within, factors.inverse)]
     if coupling.weight is not None:
         loads = [row / coupling.weight[:, None] for row in loads]
     return Response(loads, approach, pressed)
+
+
+def _constant(coupling: SliceCoupling) -> Float[Array, "slices 1"]:
+    """The even deflection of all slices, orthonormal: the support modes of slices without a support."""
+    count = len(coupling.modes)
+    return jnp.full((count, 1), count**-0.5, coupling.modes.dtype)
 
 
 def stiffness(weight: Float[Array, " slices"], factors: CoupledFactors) -> Curve:

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import jax.numpy as jnp
-from jaxtyping import Array, Bool, Float
+from jaxtyping import Array, Bool, Float, Shaped
 
 from .safe import unit
 
@@ -13,6 +13,11 @@ Slopes = list[Float[Array, "#slices positions"]]  # one row where a slope is the
 Curve = Float[Array, " positions"]
 Active = Sequence[Bool[Array, "slices positions"]]
 Load = Float[Array, ""] | Curve  # a scalar where it is the same everywhere
+
+
+def over_slices(field: Shaped[Array, "pairs *slices positions"]) -> Shaped[Array, "pairs #slices positions"]:
+    """A field of springs with an axis of slices, of length one where it is the same in all of them."""
+    return field if field.ndim == 3 else field[:, None]
 
 
 class Factors(NamedTuple):
@@ -38,8 +43,8 @@ class Factors(NamedTuple):
 
 
 def factorize(
-    compliance: Float[Array, "pairs pairs positions"],
-    lever: Float[Array, "pairs positions"],
+    compliance: Float[Array, "pairs pairs *own positions"],
+    lever: Float[Array, "pairs *each positions"],
     active: Active,
     slope: Slopes,
 ) -> Factors:
@@ -52,21 +57,22 @@ def factorize(
         slope: dh/dq of every spring, (slices, positions) or (1, positions) each.
     """
     mask = [row.astype(compliance.dtype) for row in active]
+    compliance = compliance if compliance.ndim == 4 else compliance[:, :, None]
     rows: list[Rows] = []
     diagonal: Slopes = []
     inverse: Slopes = []
     for i in range(len(mask)):
-        row = [mask[i] * mask[j] * compliance[i, j][None] for j in range(i)]
+        row = [mask[i] * mask[j] * compliance[i, j] for j in range(i)]
         for j in range(i):
             for k in range(j):
                 row[j] = row[j] - row[k] * rows[j][k] * inverse[k]
-        pivot = compliance[i, i][None] + slope[i]
+        pivot = compliance[i, i] + slope[i]
         for j in range(i):
             pivot = pivot - row[j] * row[j] * inverse[j]
         rows.append(row)
         diagonal.append(pivot)
         inverse.append(1 / pivot)
-    levers = [flag * row[None] for flag, row in zip(mask, lever)]
+    levers = [flag * row for flag, row in zip(mask, over_slices(lever))]
     return Factors(rows, diagonal, inverse, forward(rows, inverse, levers), mask)
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ..contact.status import Status, Statuses, status_of
-from ..geometry import GearPair, margins
+from ..geometry import GearPair, check_spur, margins
 from ..numerics import Checked, concrete, number, program, within_limits
 from .housing import Housing
 from .misalignment import Misalignment
@@ -124,7 +124,7 @@ class Gearbox(Checked):
             self._check_housing(self.housing)
         _ = self.path
         for index in range(len(self.meshes)):
-            self.pair(index)
+            check_spur("Gearbox", *self.pair(index).gears)  # no axial forces
         torques = concrete(_torques(self))
         if torques is None:
             return

@@ -23,7 +23,7 @@ from ..contact.solve import check_mesh, flanks_of
 from ..contact.status import Status, Statuses, status_of
 from ..dynamics import Dynamics
 from ..dynamics.steady import SteadyForce
-from ..geometry import GearPair
+from ..geometry import GearPair, check_spur
 from ..geometry.involute import half_tooth_angle
 from ..metrics.lubrication import flash_temperature
 from ..microgeometry import AbstractModification, Flank, TabulatedFlank, TabulatedProfile
@@ -382,6 +382,7 @@ def case_of(
 ) -> Case:
     """Checks and collects what wears; arguments and errors as `wear`."""
     check_mesh(owner, mesh)
+    check_spur(owner, *mesh.pair.gears)
     pinion, wheel = flanks_of(owner, mesh, pinion, wheel)
     dtype = mesh.slice_width.dtype
     loads, weights = _loads(owner, torque, dtype)

@@ -9,7 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from ...geometry import Gear, GearPair
+from ...geometry import Gear, GearPair, check_spur
 from ...numerics import AbstractSpring, Checked, concrete, program
 from ..assembly import AbstractCompliance, Outside, Structures, between_planes, with_edge
 from ..hertz import ContactGeometry, DepthReferenced
@@ -80,6 +80,7 @@ class TabulatedCompliance(AbstractCompliance, Checked):
         return with_edge(law, geometry, pinion, wheel, outside)
 
     def check(self, pair: GearPair) -> None:
+        check_spur("finite_element_compliance", *pair.gears)
         for name, tables in (("pinion", self.pinion), ("wheel", self.wheel)):
             gear: Gear = getattr(pair, name)
             if any(concrete(leaf) is None for leaf in jax.tree.leaves(gear)):

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ...geometry import Gear, Material
+from ...geometry import Gear, Material, check_spur
 from ...manufacture import allowance_of_balls, measures, over_balls
 from ...numerics import real
 from ..errors import refused
@@ -36,7 +36,7 @@ _CLOSE = 1e-9  # relative difference of numbers that mean the same
 _ALIKE = 2e-3  # mm, by which diameters on a drawing are rounded
 
 
-def check_spur(gear: Component) -> None:
+def check_external(gear: Component) -> None:
     """Refuses what is no external spur gear."""
     if gear.type != "cylindrical_gear":
         raise gear.refuse("", "is an internal gear, must be a cylindrical_gear with external teeth")
@@ -131,6 +131,7 @@ def write_gear(
     model: Model, gear: Gear, name: str, quality: int | None, material_name: str | None = None
 ) -> tuple[Component, list[Component]]:
     """Writes a gear; returns its component and those of its left and right flank."""
+    check_spur("write_rexs", gear)
     upper, tolerance = float(gear.tooth_thickness_allowance), float(gear.tooth_thickness_tolerance)
     limits = (upper, upper - tolerance) if upper or tolerance else (None, None)
     part = model.add(

@@ -14,7 +14,7 @@ from ...geometry import GearPair
 from ...microgeometry import AbstractModification, NoModification
 from ..errors import DesignFileError, naming, refused
 from ..toml import content
-from .gears import QUALITY, check_spur, read_gear, read_quality
+from .gears import QUALITY, check_external, read_gear, read_quality
 from .json_form import parse_json
 from .read_flank import read_modification
 from .rexs_model import Component, Model, parse
@@ -96,7 +96,7 @@ def _read(model: Model, stage: int | None, flank: str | None, load_case: int | N
     chosen = _stage(model, stage)
     gears = _driving_first(model, chosen)
     for gear in gears:
-        check_spur(gear)
+        check_external(gear)
     _check_version(model)
     _check_axes(gears)
     flank = _loaded(model, chosen, gears) if flank is None else flank

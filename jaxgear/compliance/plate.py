@@ -1,0 +1,96 @@
+"""The gear body as a plate under an axial force at its teeth: it tilts and dishes.
+
+Helical teeth pass on an axial force, tan(beta_b) times that on the transverse line of action, and the body gives way to
+it along the axis; tan(beta_b) times this counts on the line of action. The body is an annular plate, clamped at the
+bore, with the force on the reference circle: Kirchhoff's plate for every harmonic n of the circumference, powers
+x^(+-n), x^(2+-n) of the relative radius with logarithms where two of them are one, and the deflection by shear, whose
+flow has a harmonic potential. Against finite elements of whole gears (19/48 teeth, 15 degrees, width of 6.7 modules)
+the mean transmission error of helical gears is within 3 %, with the wheel held at a third or at two thirds of its
+diameter; without the plate it is up to 14 % too small.
+
+References:
+    S. Timoshenko, S. Woinowsky-Krieger, Theory of Plates and Shells, 1959, section 63 (loads that are not symmetric).
+"""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from ..geometry import Gear
+from ..numerics import solve_dense
+from .plane import shear_modulus
+
+Scalar = Float[Array, ""]
+
+# Harmonics that are longer than a plate of usual proportions is thick; shorter ones belong to the teeth.
+_HARMONICS = 12
+_SHEAR_FACTOR = 5 / 6  # of a plate (Reissner)
+
+
+def axial_compliance(gear: Gear) -> Scalar:
+    """Axial deflection of the reference circle under an axial force there, at the force [um/N].
+
+    Args:
+        gear: with the bore at which its body is held.
+    """
+    radius, width, material = gear.pitch_radius, gear.face_width, gear.material
+    ratio, poisson = gear.bore_radius / radius, material.poisson_ratio
+    stiffness = material.elastic_modulus * width**3 / (12 * (1 - poisson**2))
+    bending = radius**2 / (jnp.pi * stiffness) * (0.5 * _deflection(0, ratio, poisson) + _higher(ratio, poisson))
+    return 1e3 * (bending + _shear(ratio) / (jnp.pi * _SHEAR_FACTOR * shear_modulus(material) * width))
+
+
+def _higher(ratio: Scalar, poisson: Scalar) -> Scalar:
+    """Sum of `_deflection` over the harmonics from the first on."""
+    orders = jnp.arange(2, _HARMONICS + 1).astype(ratio.dtype)
+    return _deflection(1, ratio, poisson) + jnp.sum(jax.vmap(lambda n: _of_powers(n, ratio, poisson))(orders))
+
+
+def _shear(ratio: Scalar) -> Scalar:
+    """The deflection by shear alone, times pi times the shear stiffness of the plate."""
+    order = jnp.arange(1, _HARMONICS + 1).astype(ratio.dtype)
+    faded = ratio ** (2 * order)
+    return -0.5 * jnp.log(ratio) + jnp.sum((1 - faded) / ((1 + faded) * order))
+
+
+def _deflection(order: int, ratio: Scalar, poisson: Scalar) -> Scalar:
+    """Of harmonic 0 or 1, where two of the four functions are powers with a logarithm."""
+    powers = jnp.asarray([0.0, 2.0, 0.0, 2.0] if order == 0 else [1.0, 3.0, -1.0, 1.0], ratio.dtype)
+    logarithmic = np.array([False, False, True, True] if order == 0 else [False, False, False, True])
+    log = jnp.log(ratio)
+    value = ratio**powers
+    slope = powers * value / ratio
+    bore = jnp.where(logarithmic, value * log, value), jnp.where(logarithmic, slope * log + value / ratio, slope)
+    plain, more = _at_edge(powers, order, poisson), _with_logarithm(powers, order, poisson)
+    edge = [jnp.where(logarithmic, *pair) for pair in zip(more, plain)]
+    return _at_force(jnp.stack([*bore, *edge]), jnp.where(logarithmic, 0.0, 1.0).astype(ratio.dtype))
+
+
+def _of_powers(order: Scalar, ratio: Scalar, poisson: Scalar) -> Scalar:
+    """Of a harmonic from the second on; powers that fall off have their value at the bore, so that none overflows."""
+    powers = jnp.stack([order, order + 2, -order, 2 - order])
+    fade = jnp.stack([jnp.ones_like(order), jnp.ones_like(order), ratio**order, ratio ** (order - 2)])
+    value = jnp.stack([ratio**order, ratio ** (order + 2), jnp.ones_like(order), jnp.ones_like(order)])
+    rows = [value, powers * value / ratio, *(fade * row for row in _at_edge(powers, order, poisson))]
+    return _at_force(jnp.stack(rows), fade)
+
+
+def _at_edge(powers: Array, order: Scalar | int, poisson: Scalar) -> tuple[Array, Array]:
+    """Radial moment and Kirchhoff's shear force of x^p cos(n theta) at x = 1, both over minus the plate's stiffness."""
+    square = order**2
+    moment = powers * (powers - 1) + poisson * (powers - square)
+    force = powers * (powers - 1) ** 2 - powers - square * powers + 2 * square + (1 - poisson) * square * (1 - powers)
+    return moment, force
+
+
+def _with_logarithm(powers: Array, order: int, poisson: Scalar) -> tuple[Array, Array]:
+    """The same of x^p ln(x), the derivatives by the power."""
+    moment = 2 * powers - 1 + poisson
+    return moment, 3 * powers**2 - 4 * powers - order**2 * (2 - poisson)
+
+
+def _at_force(rows: Float[Array, "4 4"], there: Float[Array, "4"]) -> Scalar:
+    """Deflection at the edge under a unit force of the harmonic, clamped at the bore and free of moments outside."""
+    unit = jnp.asarray([0.0, 0.0, 0.0, -1.0], rows.dtype)
+    return there @ solve_dense(rows, unit)

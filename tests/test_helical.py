@@ -1,0 +1,273 @@
+"""Helical gears: geometry, the contact slice by slice and its limits, and what does not know them yet."""
+
+import re
+from dataclasses import replace
+from functools import cache
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+import jaxgear as jg
+from jaxgear import dynamics, manufacture, metrics, sizing, wear
+from jaxgear.compliance import finite_element_compliance, iso_stiffness
+from jaxgear.compliance.laws import LinearLaw
+from jaxgear.compliance.plate import axial_compliance
+from jaxgear.contact import helical_slices
+from jaxgear.dynamics.iso_6336 import iso_dynamic_factor
+from jaxgear.geometry import path_of_contact, tooth_thickness
+from jaxgear.tolerance import Tolerance, sample_deviations
+
+SIZES = jg.Resolution(positions=8, slices=5, pairs=4, newton_steps=12)
+TORQUE = 150.0
+
+
+def pair_of(beta=15.0, width=20.0, bores=(20.0, 100.0), **given) -> jg.GearPair:
+    """The pair of the finite elements that the model is compared with; a left-hand wheel."""
+    other = None if beta is None else -beta
+    return jg.GearPair(
+        jg.Gear(19, 3.0, face_width=width, helix_angle=beta, bore_diameter=bores[0], **given),
+        jg.Gear(48, 3.0, face_width=width, helix_angle=other, bore_diameter=bores[1], **given),
+    )
+
+
+@cache
+def solved(beta=15.0, slope=0.0) -> tuple[jg.Mesh, jg.MeshCycle]:
+    mesh = jg.prepare(pair_of(beta), resolution=SIZES)
+    return mesh, jg.solve(mesh, TORQUE, pinion=jg.LeadSlope(slope))
+
+
+def test_geometry_is_that_of_published_pairs():
+    """A commercial program's report of 24/95 teeth, an open tool's of 20/30, and a pair worked out by hand."""
+    large = jg.GearPair(
+        jg.Gear(24, 14.0, 20.0, 0.48, face_width=360.0, helix_angle=10.0, tip_diameter=380.747),
+        jg.Gear(95, 14.0, 20.0, 0.6691, face_width=360.0, helix_angle=-10.0, tip_diameter=1395.376),
+        center_distance=861.0,
+    )
+    small = jg.GearPair(
+        jg.Gear(20, 3.5, 20.0, 0.1809, face_width=23.0, helix_angle=15.0, tooth_thickness_allowance=-10.0),
+        jg.Gear(30, 3.5, 20.0, 0.0891, face_width=23.0, helix_angle=-15.0),
+        center_distance=91.5,
+    )
+    wanted = (9.3913, 1.4627, 1.4213), (14.0761, 1.4716, 0.5414), (14.0761, 1.5700, 0.5492)
+    for pair, numbers in zip((large, small, pair_of()), wanted):
+        found = np.rad2deg(pair.pinion.base_helix_angle), path_of_contact(pair).contact_ratio, pair.overlap_ratio
+        np.testing.assert_allclose(found, numbers, atol=5.1e-5)
+    assert float(small.base_pitch) == pytest.approx(10.65231, abs=5e-6)
+    force = 100e3 / small.pinion.base_radius
+    assert float(force) == pytest.approx(2949.2, abs=0.05)
+    assert float(force / jnp.cos(small.pinion.base_helix_angle)) == pytest.approx(3040.5, abs=0.05)
+    assert float(pair_of().working_center_distance) == pytest.approx(104.04526, abs=5e-6)
+    virtual = jg.Gear(17, 8.0, 20.0, 0.145, face_width=20.0, helix_angle=15.8).virtual_teeth
+    assert float(virtual) == pytest.approx(18.9051, abs=5e-5)
+
+
+def test_coefficients_are_of_the_normal_module():
+    gear = jg.Gear(30, 2.0, 20.0, 0.4, face_width=10.0, helix_angle=20.0)
+    cosine = np.cos(np.deg2rad(20.0))
+    assert float(gear.pitch_radius) == pytest.approx(30.0 / cosine)
+    assert float(gear.tip_radius - gear.pitch_radius) == pytest.approx(2.0 * 1.4)
+    thickness = tooth_thickness(gear, 2 * gear.pitch_radius)
+    assert float(thickness) == pytest.approx(2.0 * (np.pi / 2 + 0.8 * np.tan(np.deg2rad(20.0))) / cosine)
+    thinner = replace(gear, tooth_thickness_allowance=-50.0)  # normal to the tooth
+    assert float(thickness - tooth_thickness(thinner, 2 * gear.pitch_radius)) == pytest.approx(0.05 / cosine)
+
+
+def test_backlash_is_normal_to_the_flank():
+    gears = pair_of().gears
+    for by in ("both", "center_distance"):
+        pair = jg.geometry.pair_with_backlash(*gears, 80.0, by=by)
+        assert float(pair.backlash * jnp.cos(pair.pinion.base_helix_angle)) == pytest.approx(80.0, abs=1e-3)
+
+
+def test_an_angle_of_zero_is_a_spur_gear():
+    assert eqx.tree_equal(jg.Gear(19, 3.0, face_width=20.0, helix_angle=0.0), jg.Gear(19, 3.0, face_width=20.0))
+    assert pair_of(0.0).is_spur and helical_slices(pair_of(0.0)) == 1
+    assert not pair_of().is_spur and helical_slices(pair_of()) == 11
+
+
+def test_a_small_angle_goes_to_the_spur_gear():
+    """Nothing jumps where contact lines begin to run across the face, the largest pressure included."""
+    mesh, spur = solved(None)
+    assert mesh.kinematics.contact_path.shape == (4, 8) and not mesh.kinematics.helical
+    _, nearly = solved(1e-6)
+    np.testing.assert_allclose(nearly.transmission_error, spur.transmission_error, atol=1e-9)
+    np.testing.assert_allclose(nearly.line_load, spur.line_load, atol=2e-4)
+    for beta, error, pressure in ((0.01, 1e-4, 1e-3), (0.1, 2e-3, 5e-3)):
+        _, small = solved(beta)
+        np.testing.assert_allclose(small.transmission_error, spur.transmission_error, atol=error)
+        assert float(small.corner_pressure.max()) == pytest.approx(float(spur.corner_pressure.max()), rel=pressure)
+    # at a larger angle the end of the face reaches the path of contact, 0.01 mm beyond which a position happens to lie
+    flank = float(solved(0.01)[1].contact_pressure.max())
+    assert flank == pytest.approx(float(spur.contact_pressure.max()), rel=1e-3)
+
+
+def test_the_other_hand_is_the_mirrored_face():
+    _, right = solved(15.0, 20.0)
+    _, left = solved(-15.0, -20.0)
+    np.testing.assert_allclose(left.transmission_error, right.transmission_error, rtol=1e-12)
+    np.testing.assert_allclose(left.line_load[:, ::-1], right.line_load, atol=1e-9)
+
+
+def test_solution_meets_the_conditions():
+    mesh, cycle = solved()
+    assert bool(cycle.converged.all()) and mesh.kinematics.contact_path.shape == (4, 5, 8)
+    np.testing.assert_allclose(cycle.pair_force.sum(axis=0), cycle.force, rtol=1e-10)
+    load, scale = np.asarray(cycle.line_load), np.asarray(mesh.coupling.scale)
+    waves, share = np.asarray(mesh.coupling.modes), np.asarray(mesh.coupling.share)
+    kernel = waves @ share @ waves.T + float(mesh.coupling.rest) * np.eye(5)
+    deflected = np.einsum("psn,pjn,st,jtn,jtn->psn", scale, mesh.structure, kernel, scale, load)
+    approach = np.asarray(cycle.transmission_error) - float(mesh.hub * cycle.force / mesh.pair.face_width)
+    law = np.asarray(mesh.law.deflection(jnp.asarray(load)))
+    left = deflected + law + np.asarray(cycle.gap) - np.asarray(mesh.lever) * approach
+    assert left.min() > -1e-8 and np.abs(left[load > 0]).max() < 1e-8
+    assert (load > 0).any(axis=1).sum(axis=0).max() >= 2  # pairs share the load
+
+
+def test_slices_far_along_the_path_touch_later():
+    mesh, cycle = solved()
+    path, load = np.asarray(mesh.kinematics.contact_path), np.asarray(cycle.line_load)
+    ahead = float(mesh.slice_width[0] * jnp.tan(mesh.pair.pinion.base_helix_angle))
+    np.testing.assert_allclose(np.diff(path, axis=1), ahead, rtol=1e-12)  # a right hand: the positive end comes first
+    start = float(mesh.path_of_contact.start)
+    assert load[path < start - 0.2 * float(mesh.pair.base_pitch)].max() == 0
+
+
+@pytest.mark.parametrize("width, beta", [(20.0, 15.0), (36.0, 15.0)])
+def test_harmonics_of_a_constant_stiffness(width, beta):
+    """2 |sinc(n eps_alpha) sinc(n eps_beta)| of the mean; slices that are whole or apart leave about 1 / slices."""
+    sizes = replace(SIZES, positions=64, slices=81, coupled_slices=False, slide_steps=0, extended_contact=False)
+    mesh = jg.prepare(pair_of(beta, width), resolution=sizes)
+    outside = mesh.kinematics.contact_outside > 0
+    plain = eqx.tree_at(
+        lambda m: (m.structure, m.law, m.corner_gap, m.lever),
+        mesh,
+        (
+            jnp.zeros_like(mesh.structure),
+            LinearLaw(jnp.full_like(mesh.lever, 0.1)),
+            jnp.where(outside, 1e6, 0.0),
+            jnp.ones_like(mesh.lever),
+        ),
+    )
+    stiffness = 1 / (1 / jg.solve(plain, TORQUE).tangent_stiffness - plain.hub / plain.pair.face_width)
+    found = 2 * np.abs(np.fft.rfft(stiffness))[1:3] / np.sum(stiffness)
+    order, ratios = np.arange(1, 3), (float(path_of_contact(mesh.pair).contact_ratio), float(mesh.pair.overlap_ratio))
+    wanted = 2 * np.abs(np.sinc(order * ratios[0]) * np.sinc(order * ratios[1]))
+    np.testing.assert_allclose(found, wanted, atol=0.01)
+
+
+# Three-dimensional finite elements of whole gears, 16 slices, mean TE and PPTE [um] and the largest over the mean line
+# load, summed over the pairs and averaged over the cycle; bore of the wheel [mm], torque [N m]
+REFERENCE = {
+    ("unmodified", 40.0, 150.0): (22.2682, 2.7279, 1.0705),
+    ("unmodified", 100.0, 150.0): (16.3957, 2.5887, 1.0240),
+    ("crowning", 40.0, 150.0): (25.4173, 3.4190, 1.5127),
+    ("crowning", 100.0, 50.0): (8.2040, 2.2927, 2.1973),
+    ("slope", 100.0, 50.0): (3.9505, 3.1332, 3.5000),
+    ("slope", 100.0, 150.0): (16.2304, 3.5690, 1.9349),
+    ("other slope", 100.0, 150.0): (16.2576, 3.6838, 1.9250),
+    ("relief", 100.0, 150.0): (18.1351, 2.6769, 1.0301),
+}
+FLANKS = {"crowning": jg.LeadCrowning(10.0), "slope": jg.LeadSlope(20.0), "other slope": jg.LeadSlope(-20.0)}
+
+
+@pytest.mark.slow
+def test_whole_gears_in_finite_elements():
+    meshes = {
+        bore: jg.prepare(pair_of(bores=(20.0, bore)), resolution=replace(SIZES, positions=32, slices=15))
+        for bore in (40.0, 100.0)
+    }
+    for (kind, bore, torque), (mean, ripple, factor) in REFERENCE.items():
+        mesh, both = meshes[bore], {"pinion": FLANKS.get(kind), "wheel": None}
+        if kind == "relief":
+            addendum = [side.tip_roll_length - side.pitch_roll_length for side in mesh.sides]
+            both = {name: jg.TipRelief(8.0, 0.4 * length) for name, length in zip(both, addendum)}
+        cycle = jg.solve(mesh, torque, **both)
+        error, load = np.asarray(cycle.transmission_error), np.asarray(cycle.line_load).sum(axis=0).mean(axis=-1)
+        assert bool(cycle.converged.all())
+        assert error.mean() == pytest.approx(mean, rel=0.03), (kind, bore)
+        assert np.ptp(error) == pytest.approx(ripple, rel=0.10), (kind, bore)
+        assert load.max() / load.mean() == pytest.approx(factor, rel=0.06), (kind, bore)
+
+
+def test_the_body_tilts_under_the_axial_force():
+    """Half the width makes a plate eight times as soft, but for shear; a wheel that is held far out hardly yields."""
+    gears = [jg.Gear(48, 3.0, face_width=b, helix_angle=15.0, bore_diameter=40.0) for b in (5.0, 10.0)]
+    thin, thick = map(float, map(axial_compliance, gears))
+    assert 7.0 < thin / thick < 8.0
+    assert float(axial_compliance(pair_of().wheel)) < 0.3 * float(axial_compliance(pair_of(bores=(20.0, 40.0)).wheel))
+    # without the tilt, of the ring alone: the same torsion as that of a spur gear of these radii
+    twisted = float(solved()[0].hub) - 20.0 * float(jnp.tan(pair_of().pinion.base_helix_angle)) ** 2 * sum(
+        float(axial_compliance(gear)) for gear in pair_of().gears
+    )
+    assert 0 < twisted < float(solved()[0].hub)
+
+
+@pytest.mark.slow
+def test_derivatives_by_angle_and_width_are_central_differences():
+    def ripple(x):
+        mesh = jg.prepare(pair_of(x[0], x[1]), resolution=SIZES)
+        return jg.peak_to_peak(jg.solve(mesh, TORQUE, pinion=jg.LeadCrowning(5.0)).transmission_error)
+
+    at, step = jnp.array([15.0, 20.0]), 1e-4
+    steps = step * jnp.eye(2)
+    wanted = [(ripple(at + each) - ripple(at - each)) / (2 * step) for each in steps]
+    for mode in (jax.jacfwd, jax.jacrev):
+        np.testing.assert_allclose(jax.jit(mode(ripple))(at), wanted, rtol=1e-6, atol=1e-8)
+
+
+@pytest.mark.slow
+def test_flanks_are_found_by_gradients():
+    mesh = solved()[0]
+    found = jg.optimize.minimize(
+        lambda x: (jg.TipRelief(x["amount"], 2.7), jg.TipRelief(x["amount"], 3.0)),
+        {"amount": (0.0, 20.0)},
+        mesh=mesh,
+        torque=TORQUE,
+    )
+    finer = jg.solve(jg.prepare(mesh.pair, resolution=replace(SIZES, positions=512)), TORQUE)
+    assert float(found.objective) < float(jg.peak_to_peak(finer.transmission_error))
+
+
+def test_gears_must_have_opposite_hands():
+    gear = jg.Gear(19, 3.0, face_width=20.0, helix_angle=15.0)
+    with pytest.raises(ValueError, match=r"wheel helix_angle = 15 deg must be -15 deg: gears on parallel shafts"):
+        jg.GearPair(gear, jg.Gear(48, 3.0, face_width=20.0, helix_angle=15.0))
+    traced = jax.eval_shape(lambda beta: jg.geometry.margins(jg.GearPair(gear, replace(gear, helix_angle=beta))), -15.0)
+    assert traced.backlash.shape == ()
+    same = jax.jit(lambda beta: jg.geometry.margins(jg.GearPair(gear, replace(gear, helix_angle=beta))).valid)
+    assert bool(same(-15.0)) and not bool(same(15.0)) and not bool(same(-14.0))
+
+
+REFUSED = {
+    "one slice": lambda: jg.prepare(pair_of(), resolution=replace(SIZES, slices=1)),
+    "path": lambda: solved()[0].path,
+    "outside": lambda: solved()[1].kinematics.outside,
+    "finite elements": lambda: finite_element_compliance(pair_of(None)).check(pair_of()),
+    "ISO 6336-1": lambda: iso_stiffness(pair_of()),
+    "K_v": lambda: iso_dynamic_factor(pair_of(), TORQUE, 1000.0),
+    "relief": lambda: sizing.relief_amount(pair_of(), TORQUE),
+    "contact stress": lambda: metrics.nominal_contact_stress(solved()[1]),
+    "root stress": lambda: metrics.root_stress(solved()[1]),
+    "losses": lambda: metrics.loss_factor(solved()[1]),
+    "map of forces": lambda: dynamics.mesh_force(solved()[0], torque=TORQUE),
+    "wear": lambda: wear.wear(solved()[0], TORQUE, coefficient=1e-18, revolutions=1e6),
+    "span": lambda: manufacture.span(pair_of().pinion, 3),
+    "balls": lambda: manufacture.over_balls(pair_of().pinion, 5.0),
+    "form wheel": lambda: manufacture.wheel_profile(solved()[0].sides[0], jg.TipRelief(5.0, 2.0)),
+    "deviations": lambda: sample_deviations(Tolerance(), solved()[0], 1, 0),
+}
+
+
+@pytest.mark.parametrize("ask", REFUSED.values(), ids=REFUSED)
+def test_what_does_not_know_helical_gears_says_so(ask):
+    with pytest.raises(ValueError, match="helical") as refused:
+        ask()
+    assert len(str(refused.value).splitlines()) == 1
+
+
+def test_a_single_slice_names_the_number_that_shows_them():
+    with pytest.raises(ValueError, match=re.escape("Resolution(slices=11)")):
+        jg.prepare(pair_of(), resolution=replace(SIZES, slices=1))
