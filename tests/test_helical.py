@@ -124,6 +124,7 @@ def test_solution_meets_the_conditions():
     left = deflected + law + np.asarray(cycle.gap) - np.asarray(mesh.lever) * approach
     assert left.min() > -1e-8 and np.abs(left[load > 0]).max() < 1e-8
     assert (load > 0).any(axis=1).sum(axis=0).max() >= 2  # pairs share the load
+    assert str(cycle).splitlines()[-1].split() == ["overlap", "ratio", "0.549"]
 
 
 def test_slices_far_along_the_path_touch_later():

@@ -172,5 +172,6 @@ class MeshCycle(WithStatus, eqx.Module):
                 f"  flank pressure       max {pressure.max():.0f} MPa, tip corners {corner.max():.0f} MPa",
                 f"  mesh stiffness       mean {np.mean(self.tangent_stiffness):.1f} N/um",
                 f"  contact ratio        {float(self.kinematics.path_of_contact.contact_ratio):.3f}",
+                *[f"  overlap ratio        {float(self.kinematics.pair.overlap_ratio):.3f}"] * self.kinematics.helical,
             ]
         )
