@@ -4,9 +4,9 @@ Helical teeth pass on an axial force, tan(beta_b) times that on the transverse l
 it along the axis; tan(beta_b) times this counts on the line of action. The body is an annular plate, clamped at the
 bore, with the force on the reference circle: Kirchhoff's plate for every harmonic n of the circumference, powers
 x^(+-n), x^(2+-n) of the relative radius with logarithms where two of them are one, and the deflection by shear, whose
-flow has a harmonic potential. Against finite elements of whole gears (19/48 teeth, 15 degrees, width of 6.7 modules)
-the mean transmission error of helical gears is within 3 %, with the wheel held at a third or at two thirds of its
-diameter; without the plate it is up to 14 % too small.
+flow has a harmonic potential. Against finite elements of whole gears (19/48 teeth, module 3 mm, 15 degrees, face of 20
+mm) the mean transmission error of unmodified gears is within 2 %, with the wheel held at 40 mm or at 100 mm; without
+the plate it is up to 14 % too small.
 
 References:
     S. Timoshenko, S. Woinowsky-Krieger, Theory of Plates and Shells, 1959, section 63 (loads that are not symmetric).

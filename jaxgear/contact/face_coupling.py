@@ -54,9 +54,9 @@ def spreading_of(pair: GearPair, outlines: tuple[Outline, Outline], sizes: Resol
     parts = sizes.slices if sizes.parts is None else sum(sizes.parts)
     angle = pair.pinion.helix_angle
     if even:
-        kernel = face_kernel(pair.face_width, root_chord, parts, None, angle)
+        kernel = face_kernel(pair.face_width, root_chord, parts, helix_angle=angle)
         return Spreading(jnp.ones((2,), kernel.dtype), _over_slices(kernel, sizes)[None])
-    both = [face_kernel(pair.face_width, root_chord, parts, overhang, angle) for overhang in pair.overhangs]
+    both = [face_kernel(pair.face_width, root_chord, parts, overhang, helix_angle=angle) for overhang in pair.overhangs]
     kernels = jnp.stack(both)
     shares = jnp.sum(kernels, axis=(1, 2)) / parts
     ends = face_ends(pair.face_width, root_chord, parts)
