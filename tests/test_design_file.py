@@ -465,9 +465,9 @@ MALFORMED = {
     "symbol of the field": (text().replace("teeth = 19", "z = 19"), 'pinion.z: unknown key, did you mean "teeth"?'),
     "symbol with an index": (text(pinion="d_a1 = 60.0"), 'pinion.d_a1: unknown key, did you mean "tip_diameter"?'),
     "symbol of two tables": (text(load="m = 3.0"), 'load.m: unknown key, did you mean "torque"?'),
-    "helical gear": (
-        text(pinion="helix_angle = 10.0"),
-        "pinion.helix_angle: unknown key, design files know spur gears",
+    "symbol of helical gears": (
+        text(pinion="beta = 10.0"),
+        'pinion.beta: unknown key, did you mean "helix_angle"?',
     ),
     "unit with a number": (
         text().replace("torque = 50.0", 'torque = "250 Nm"'),

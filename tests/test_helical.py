@@ -2,13 +2,13 @@
 
 import re
 from dataclasses import replace
-from functools import cache
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from helical_pairs import SIZES, TORQUE, pair_of, solved
 
 import jaxgear as jg
 from jaxgear import dynamics, manufacture, metrics, sizing, wear
@@ -18,25 +18,6 @@ from jaxgear.compliance.plate import axial_compliance
 from jaxgear.contact import helical_slices
 from jaxgear.dynamics.iso_6336 import iso_dynamic_factor
 from jaxgear.geometry import path_of_contact, tooth_thickness
-from jaxgear.tolerance import Tolerance, sample_deviations
-
-SIZES = jg.Resolution(positions=8, slices=5, pairs=4, newton_steps=12)
-TORQUE = 150.0
-
-
-def pair_of(beta=15.0, width=20.0, bores=(20.0, 100.0), **given) -> jg.GearPair:
-    """The pair of the finite elements that the model is compared with; a left-hand wheel."""
-    other = None if beta is None else -beta
-    return jg.GearPair(
-        jg.Gear(19, 3.0, face_width=width, helix_angle=beta, bore_diameter=bores[0], **given),
-        jg.Gear(48, 3.0, face_width=width, helix_angle=other, bore_diameter=bores[1], **given),
-    )
-
-
-@cache
-def solved(beta=15.0, slope=0.0) -> tuple[jg.Mesh, jg.MeshCycle]:
-    mesh = jg.prepare(pair_of(beta), resolution=SIZES)
-    return mesh, jg.solve(mesh, TORQUE, pinion=jg.LeadSlope(slope))
 
 
 def test_geometry_is_that_of_published_pairs():
@@ -255,10 +236,7 @@ REFUSED = {
     "losses": lambda: metrics.loss_factor(solved()[1]),
     "map of forces": lambda: dynamics.mesh_force(solved()[0], torque=TORQUE),
     "wear": lambda: wear.wear(solved()[0], TORQUE, coefficient=1e-18, revolutions=1e6),
-    "span": lambda: manufacture.span(pair_of().pinion, 3),
-    "balls": lambda: manufacture.over_balls(pair_of().pinion, 5.0),
     "form wheel": lambda: manufacture.wheel_profile(solved()[0].sides[0], jg.TipRelief(5.0, 2.0)),
-    "deviations": lambda: sample_deviations(Tolerance(), solved()[0], 1, 0),
 }
 
 

@@ -1,6 +1,7 @@
 """Design files: a gear pair, its load, its flank modifications and their free parameters, as TOML."""
 
 import json
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -29,6 +30,7 @@ from .gears import (
     drawing_of,
     flank_of,
     gear_part,
+    longest_path,
     materials_of,
     pair_of,
     quality_of,
@@ -201,6 +203,7 @@ class DesignFile:
     _load: Part
     _mesh: FileMesh
     _middle: MeshParts
+    _longest: GearPair
 
     def needed(self, name: str, why: str) -> Any:
         """A further table, of which a command says why it needs it.
@@ -268,7 +271,8 @@ class DesignFile:
             problem = f"{given}: give the torque in N m"
             raise DesignFileError("load.torque", problem, self.path) from None
         if self._mesh.pair.free():  # other variants can have a larger contact ratio
-            pairs = max(pairs, _OPEN_PAIRS)
+            further = float(self._longest.overlap_ratio - pair.overlap_ratio)
+            pairs = max(pairs + math.ceil(further), _OPEN_PAIRS)
         return replace(self._mesh.resolution, pairs=pairs)
 
     @property
@@ -369,6 +373,7 @@ def _read(file: Path, says: dict[str, Any]) -> DesignFile:
     bounds, units, values = read_variables(top.variables, [*open_flanks, *open_case], empty)
     middle = {name: 0.5 * (low + high) for name, (low, high) in bounds.items()}
     usual_pair, usual = pair.build(middle), point.build(middle)
+    longest = longest_path(usual_pair, pair, bounds)
     if not pair.free():
         check_files(flanks, usual_pair)
     ends = [{name: limits[end] for name, limits in bounds.items()} for end in (0, 1)]
@@ -391,7 +396,7 @@ def _read(file: Path, says: dict[str, Any]) -> DesignFile:
         options: dict[str, Any] = {"torque": torque, "folder": folder, "materials": materials}
         shafts = usual_pair, top.shafts, top.meshes, top.housing
         support = gearbox.support_of(*shafts, direction=layout.direction, **options)
-    sizes = resolution_of(top.resolution, uneven, bent=layout is not None and len(top.meshes) < 2)
+    sizes = resolution_of(top.resolution, uneven, bent=layout is not None and len(top.meshes) < 2, longest=longest)
     model = with_tables(model, top.model, folder, pair, usual_pair)  # last, as it takes longer than all the rest
     mesh = FileMesh(pair, model, axes, sizes)
     classes = tables["tolerance"].quality_class if "tolerance" in tables else quality
@@ -416,4 +421,5 @@ def _read(file: Path, says: dict[str, Any]) -> DesignFile:
         _load=point,
         _mesh=mesh,
         _middle=mesh.parts(middle),
+        _longest=longest,
     )

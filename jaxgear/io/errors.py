@@ -18,6 +18,7 @@ _SYMBOLS = {
     "pressure_angle": "alpha alphan alphap alpha0",
     "profile_shift": "x xstar",
     "face_width": "b width",
+    "helix_angle": "beta helix",
     "addendum": "ha hap",
     "dedendum": "hf hfp",
     "root_radius": "rho rhof rhofp",
@@ -47,7 +48,6 @@ _SYMBOLS = {
 }
 # Control characters, but for tabs and line ends, and those that turn the order of what follows (Unicode TR 36).
 _OBEYED = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]")
-_OF_HELICAL_GEARS = "helixangle", "helix", "beta"
 
 
 class DesignFileError(ValueError):
@@ -139,8 +139,6 @@ def suggestion(name: object, valid: Iterable[str]) -> str:
     """What to write instead of a name: the nearest valid one, or all of them where none is near."""
     names = sorted(valid)
     plain = str(name).replace("_", "").lower()
-    if plain in _OF_HELICAL_GEARS and "teeth" in names:
-        return "design files know spur gears: solve helical ones with the library"
     meant = [key for key, symbols in _SYMBOLS.items() if key in names and plain.rstrip("12") in symbols.split()]
     near = meant or difflib.get_close_matches(str(name), names, n=1, cutoff=0.5)
     if near:

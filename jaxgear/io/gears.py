@@ -1,6 +1,6 @@
 """Gears, their materials and their pair, as a design file gives them."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -8,7 +8,8 @@ from typing import Any
 from ..geometry import Gear, GearPair, Material, pair_with_backlash
 from ..manufacture import ToothThickness, drawn_gear
 from ..microgeometry import AbstractModification
-from ..numerics import Number, fields_of
+from ..numerics import Number, changed, fields_of
+from ..numerics import real as real_number
 from .errors import DesignFileError, check_known
 from .flanks import FlankFileSection, flank_part
 from .table_keys import FileTable, as_field, decode, described, entry, part_of, section_of
@@ -18,10 +19,17 @@ from .value_types import QUALITY_CLASS, Kind, either, list_of, not_of_kind, real
 _STEEL = "STEEL"
 # with any of these a gear says how thick its teeth are
 _THICKNESS = ("span", "over_balls", "tooth_thickness_allowance", "tooth_thickness_tolerance")
+_HAND = "helix_angle"
+# by its bounds, the value of a number with which the overlap ratio is the largest
+_LONGEST: Mapping[str, Callable[[tuple[float, float]], float]] = {
+    _HAND: lambda ends: max(map(abs, ends)),
+    "face_width": max,
+    "module": min,
+}
 _WITHOUT_FLANKS = "modification", "quality_class"
 
 _ThicknessKeys = section_of(ToothThickness, most=(("teeth_spanned", 1000),))
-_GearKeys = section_of(Gear, ("material", "tooth_thickness_allowance", "helix_angle"))  # commands know spur gears
+_GearKeys = section_of(Gear, ("material", "tooth_thickness_allowance"))
 
 _BACKLASH = Number("um", low=0.0)
 MATERIAL = either(text(), described(Material), "the name of a material, or a table")
@@ -43,6 +51,9 @@ class GearSection(_ThicknessKeys, _GearKeys):  # type: ignore[misc, valid-type]
     upper limit, between which the tooth is in the middle.
 
     Attributes:
+        helix_angle: beta on the reference cylinder, positive for a right hand; a spur gear without it. Module, pressure
+            angle and coefficients are then those of the normal section. Pinion and wheel have opposite hands: that of
+            one of them is enough, and a variable stands in one of them; where both are given they must be opposite.
         tooth_thickness_allowance: E_sns on the reference cylinder, negative for backlash, or [E_sni, E_sns].
         span: base tangent length W_k over `teeth_spanned` teeth, or its limits.
         teeth_spanned: k.
@@ -64,8 +75,8 @@ class PairSection(section_of(GearPair, ("pinion", "wheel"))):  # type: ignore[mi
     """Pinion (driving) and wheel (driven) on their centre distance.
 
     Attributes:
-        backlash: backlash on the line of action, by the tooth thickness of the gears without a thickness of their own,
-            or by the centre distance where both have one.
+        backlash: backlash on the line of action, of helical gears normal to the flanks, by the tooth thickness of the
+            gears without a thickness of their own, or by the centre distance where both have one.
     """
 
     backlash: float | Free | None = entry(real(_BACKLASH, open=True))
@@ -107,7 +118,7 @@ def fixed_gear(section: GearSection, materials: Materials) -> Gear:
 
 def gear_part(section: GearSection, materials: Materials) -> Part:
     """A gear without its modifications."""
-    gear, measures = part_of(section, Gear, without=("material", "helix_angle")), part_of(section, ToothThickness)
+    gear, measures = part_of(section, Gear, without=("material",)), part_of(section, ToothThickness)
     if section.material is not None:
         gear = gear.having(material=_material(f"{section.at}.material", section.material, materials))
     gear = gear.having(**measures.fields)
@@ -135,7 +146,8 @@ def _fixed(part: Part) -> Any:
 
 def pair_of(section: PairSection, pinion: Part, wheel: Part) -> Part:
     """The pair of two gears, with what its table says."""
-    pair = Part(GearPair, {"pinion": pinion, "wheel": wheel}, section.at).having(**part_of(section, GearPair).fields)
+    gears = _of_opposite_hands({"pinion": pinion, "wheel": wheel})
+    pair = Part(GearPair, gears, section.at).having(**part_of(section, GearPair).fields)
     if section.backlash is None:
         return pair
     open_gears = [name for name in ("pinion", "wheel") if not set(pair.fields[name].fields) & set(_THICKNESS)]
@@ -144,6 +156,40 @@ def pair_of(section: PairSection, pinion: Part, wheel: Part) -> Part:
         raise DesignFileError("pair.backlash", problem)
     by = {0: "center_distance", 1: open_gears[-1] if open_gears else "", 2: "both"}[len(open_gears)]
     return replace(pair.having(backlash=as_field(section.backlash, _BACKLASH), by=by), make=pair_with_backlash)
+
+
+def _of_opposite_hands(gears: dict[str, Part]) -> dict[str, Part]:
+    """Both gears, with the helix angle of either of them; gears without one are spur gears."""
+    angles = {name: gear.fields[_HAND] for name, gear in gears.items() if _HAND in gear.fields}
+    free = [name for name, angle in angles.items() if isinstance(angle, Free)]
+    if len(angles) == len(gears) and free:
+        other = "wheel" if free[0] == "pinion" else "pinion"
+        problem = f"has no effect, {free[0]}.{_HAND} is a variable and that of the {other} is its opposite"
+        raise DesignFileError(f"{gears[other].key}.{_HAND}", problem)
+    if len(angles) != 1:
+        return gears
+    (own, angle), *_ = angles.items()
+    opposite = replace(angle, opposite=True) if isinstance(angle, Free) else -angle
+    return {name: gear if name == own else gear.having(**{_HAND: opposite}) for name, gear in gears.items()}
+
+
+def longest_path(pair: GearPair, part: Part, bounds: Mapping[str, tuple[float, float]]) -> GearPair:
+    """A pair with those values of its free numbers that make its contact lines run the farthest along the path.
+
+    Args:
+        pair: with all variables in the middle of their bounds.
+        part: the same with its free numbers.
+        bounds: (low, high) of every free parameter.
+    """
+    made = {}
+    for name, gear in zip(("pinion", "wheel"), pair.gears):
+        ends = {
+            field: _LONGEST[field](bounds[value.name])
+            for field, value in part.fields[name].fields.items()
+            if field in _LONGEST and isinstance(value, Free)
+        }
+        made[name] = changed(gear, **{field: real_number(end) for field, end in ends.items()})
+    return changed(pair, **made)
 
 
 def quality_of(pinion: GearSection, wheel: GearSection) -> list[int] | None:

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from ..compliance import AbstractCompliance, Compliance, finite_element_compliance, legacy_compliance
-from ..contact import Resolution
+from ..contact import Resolution, helical_slices
 from ..geometry import GearPair
 from . import template
 from .errors import DesignFileError, check_file, referring, refused
@@ -39,25 +39,29 @@ ResolutionSection = section_of(
 )
 
 
-def resolution_of(section: FileTable, uneven: list[str], *, bent: bool) -> Resolution:
+def resolution_of(section: FileTable, uneven: list[str], *, bent: bool, longest: GearPair) -> Resolution:
     """The array sizes.
 
     Args:
         section: the table of that name.
         uneven: keys of the modifications that vary along the face.
         bent: shafts bend; slices show it where the file says nothing else.
+        longest: the pair, of those that the variables make, whose contact lines run the farthest along the path.
 
     Raises:
-        DesignFileError: for one slice where modifications vary along the face.
+        DesignFileError: for one slice where modifications vary along the face, or of helical gears.
     """
     sizes = section.given()
     if sizes.get("slice_widths") is not None:
         sizes.setdefault("slices", len(sizes["slice_widths"]))
-    if bent:
-        sizes.setdefault("slices", _SLICES)
-    if uneven and sizes.setdefault("slices", _SLICES) == 1:
-        problem = f"must be at least 2, 1 cannot show {uneven[0]}, which varies along the face"
-        raise DesignFileError("resolution.slices", f"{problem} ({_SLICES} where the key is left out)")
+    usual = max(_SLICES, helical_slices(longest))
+    seen = [] if longest.is_spur else ["helical gears, whose contact lines run across the face"]
+    seen += [f"{key}, which varies along the face" for key in uneven]
+    if bent or seen:
+        sizes.setdefault("slices", usual)
+    if seen and sizes["slices"] == 1:
+        problem = f"must be at least 2, 1 cannot show {seen[0]}"
+        raise DesignFileError("resolution.slices", f"{problem} ({usual} where the key is left out)")
     return template.Part(Resolution, sizes, "resolution").build({})
 
 

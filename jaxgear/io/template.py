@@ -26,11 +26,13 @@ class Free:
         name: of the variable.
         key: where it stands.
         number: what may stand there.
+        opposite: whether it is minus the variable.
     """
 
     name: str
     key: str
     number: Number
+    opposite: bool = False
 
 
 class Part(eqx.Module):
@@ -90,7 +92,7 @@ def _fill(value, parameters):
     if isinstance(value, Part):
         return value.build(parameters)
     if isinstance(value, Free):
-        return parameters[value.name]
+        return -parameters[value.name] if value.opposite else parameters[value.name]
     if isinstance(value, list) and _open(value):
         return jnp.stack([jnp.asarray(_fill(item, parameters), float) for item in value])
     return value

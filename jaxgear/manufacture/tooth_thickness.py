@@ -1,4 +1,4 @@
-"""Tooth thickness as drawings give it: over several teeth, over balls, or as an allowance (ISO 21771, spur gears).
+"""Tooth thickness as drawings give it: over several teeth, over balls, or as an allowance (ISO 21771).
 
 The numbers are those of unmodified flanks: a relief may not reach where the anvils or balls touch.
 """
@@ -12,7 +12,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from ..geometry import Gear, check_spur, outline
+from ..geometry import Gear, outline
 from ..geometry.involute import involute
 from ..numerics import Checked, Given, Numbers, bracketed_root, check, concrete, count, fields_of, number, real, whole
 
@@ -25,10 +25,9 @@ _WIDEST = 3.0  # tan(pressure angle) at the ball centre, about 72 degrees
 def teeth_spanned(gear: Gear) -> int:
     """Number of teeth k over which a span is measured, of a concrete gear.
 
-    The anvils then touch nearest to the diameter d + 2 x m, where tan(alpha_v) = sqrt((d + 2 x m)^2 - d_b^2) / d_b:
-    k = z / pi (tan(alpha_v) - inv(alpha)) - 2 x tan(alpha) / pi + 0.5, rounded, and at least 2.
+    The anvils then touch nearest to the diameter d + 2 x m_n, where tan(alpha_v) = sqrt((d + 2 x m_n)^2 - d_b^2) / d_b:
+    k = z / pi (tan(alpha_v) / cos(beta_b)^2 - inv(alpha_t)) - 2 x tan(alpha_n) / pi + 0.5, rounded, and at least 2.
     """
-    check_spur("teeth_spanned", gear)
     return int(_teeth_spanned(gear))
 
 
@@ -36,43 +35,64 @@ def _teeth_spanned(gear: Gear) -> Scalar:
     tangent = jnp.tan(jnp.deg2rad(gear.pressure_angle))
     radius = gear.pitch_radius + gear.profile_shift * gear.module
     touched = jnp.sqrt(jnp.maximum((radius / gear.base_radius) ** 2 - 1, 0.0))
-    exact = gear.teeth / jnp.pi * (touched - involute(tangent))
+    touched = touched / jnp.cos(gear.base_helix_angle) ** 2
+    exact = gear.teeth / jnp.pi * (touched - _pitch_involute(gear))
     return jnp.maximum(jnp.round(exact - 2 * gear.profile_shift * tangent / jnp.pi + 0.5), 2.0)
 
 
 def span(gear: Gear, teeth: int) -> Scalar:
-    """Base tangent length W_k [mm] over a number of teeth k: (k - 1) p_b + s_b.
+    """Base tangent length W_k [mm] over a number of teeth k, normal to the flanks: (k - 1) p_bn + s_bn.
 
-    W_k = m cos(alpha) (pi (k - 0.5) + z inv(alpha)) + 2 x m sin(alpha) + E_sns cos(alpha).
+    W_k = m_n cos(alpha_n) (pi (k - 0.5) + z inv(alpha_t)) + 2 x m_n sin(alpha_n) + E_sns cos(alpha_n). Across the face
+    of a helical gear it takes W_k sin(beta_b).
 
     Args:
         gear: the gear, with its tooth thickness allowance.
         teeth: k, see `teeth_spanned`.
 
     Raises:
-        ValueError: unless k is a whole number from 1 to the number of teeth, or where the anvils miss the involute.
+        ValueError: unless k is a whole number from 1 to the number of teeth, where the anvils miss the involute, or for
+            a face of a helical gear that is too narrow.
     """
-    check_spur("span", gear)
     most = concrete(gear.teeth)
     whole("span", "teeth", teeth, 1, float("inf") if most is None else float(most))
     found = _span(gear, teeth)
-    _check_touched("span", "teeth", teeth, "", 0.5 * found, gear)
+    _check_touched("span", "teeth", teeth, "", _half_span(gear, found), gear)
+    across, width = concrete(_across(gear, found)), concrete(gear.face_width)
+    if across is not None and width is not None and across > width:
+        taken = f"takes {float(across):.4g} mm of the face, must take at most {float(width):.4g} mm, the face width"
+        raise ValueError(f"span: teeth = {teeth:g} {taken}: such a helical gear is measured over fewer, or over balls")
     return found
 
 
 def _span(gear: Gear, teeth: Given) -> Scalar:
     alpha = jnp.deg2rad(gear.pressure_angle)
-    nominal = jnp.pi * (teeth - 0.5) + gear.teeth * involute(jnp.tan(alpha))
+    nominal = jnp.pi * (teeth - 0.5) + gear.teeth * _pitch_involute(gear)
     shifted = 2 * gear.profile_shift * gear.module * jnp.sin(alpha)
     return jnp.cos(alpha) * (gear.module * nominal + 1e-3 * gear.mean_tooth_thickness_allowance) + shifted
 
 
-def over_balls(gear: Gear, ball: Given) -> Scalar:
-    """Dimension over two balls M_dK [mm], or over pins, which is the same for spur gears.
+def _pitch_involute(gear: Gear) -> Scalar:
+    """inv(alpha_t)."""
+    return involute(jnp.tan(gear.transverse_pressure_angle))
 
-    inv(alpha_K) = inv(alpha) + D_M / (z m cos(alpha)) - pi / (2 z) + 2 x tan(alpha) / z + E_sns / (m z); the centres of
-    the balls lie on d_K = d_b / cos(alpha_K). M_dK = d_K + D_M for an even number of teeth; for an odd one the balls
-    are half a pitch off the diameter, M_dK = d_K cos(pi / (2 z)) + D_M.
+
+def _half_span(gear: Gear, length: Scalar) -> Scalar:
+    """Roll length at which the anvils touch over a length [mm]."""
+    return 0.5 * length * jnp.cos(gear.base_helix_angle)
+
+
+def _across(gear: Gear, length: Scalar) -> Scalar:
+    """How much of the face a length across the teeth takes [mm]."""
+    return length * jnp.abs(jnp.sin(gear.base_helix_angle))
+
+
+def over_balls(gear: Gear, ball: Given) -> Scalar:
+    """Dimension over two balls M_dK [mm] in one transverse section, or over pins, which is the same for spur gears.
+
+    inv(alpha_Kt) = inv(alpha_t) + D_M / (z m_n cos(alpha_n)) - pi / (2 z) + 2 x tan(alpha_n) / z + E_sns / (m_n z); the
+    centres of the balls lie on d_K = d_b / cos(alpha_Kt). M_dK = d_K + D_M for an even number of teeth; for an odd one
+    the balls are half a pitch off the diameter, M_dK = d_K cos(pi / (2 z)) + D_M.
 
     Args:
         gear: the gear, with its tooth thickness allowance.
@@ -81,7 +101,6 @@ def over_balls(gear: Gear, ball: Given) -> Scalar:
     Raises:
         ValueError: for a ball that falls onto the root circle, does not stand out of the spaces or misses the involute.
     """
-    check_spur("over_balls", gear)
     check("over_balls", "ball", ball, "mm", low=0.0, open_low=True)
     wanted, radius, touched = _ball(gear, ball)
     _check_ball(gear, ball, wanted, radius)
@@ -90,15 +109,16 @@ def over_balls(gear: Gear, ball: Given) -> Scalar:
 
 
 def _ball(gear: Gear, ball: Given) -> tuple[Scalar, Scalar, Scalar]:
-    """inv(alpha_K), radius of the ball's centre and roll length where it touches [mm]."""
+    """inv(alpha_Kt), radius of the ball's centre and roll length where it touches [mm]."""
     wanted = _thick(gear, ball, 1e-3 * gear.mean_tooth_thickness_allowance)
     tangent = bracketed_root(_missing, jnp.full_like(wanted, 1e-6), jnp.full_like(wanted, _WIDEST), wanted)
-    # the ball's centre lies on the normal of the involute where it touches
-    return wanted, gear.base_radius * jnp.sqrt(1 + tangent**2), gear.base_radius * tangent - 0.5 * ball
+    # the ball's centre lies on the normal of the flank where it touches, which is inclined to the transverse section
+    along = 0.5 * ball * jnp.cos(gear.base_helix_angle)
+    return wanted, gear.base_radius * jnp.sqrt(1 + tangent**2), gear.base_radius * tangent - along
 
 
 class Measures(NamedTuple):
-    """What the tooth thickness of a gear measures; lengths are NaN where anvils or balls miss the involute.
+    """What the tooth thickness of a gear measures; lengths are NaN where anvils or balls miss the flanks.
 
     Attributes:
         teeth: k of the span.
@@ -121,7 +141,6 @@ def measures(gear: Gear, teeth: Given | None = None, ball: Given | None = None) 
         teeth: k; None for `teeth_spanned`.
         ball: D_M [mm]; None for 1.7 modules.
     """
-    check_spur("measures", gear)
     teeth = _teeth_spanned(gear) if teeth is None else real(teeth)
     ball = _USUAL_BALL * gear.module if ball is None else real(ball)
     first, (wanted, centre, touched) = _span(gear, teeth), _ball(gear, ball)
@@ -132,7 +151,8 @@ def measures(gear: Gear, teeth: Given | None = None, ball: Given | None = None) 
 
     outside = (wanted > 0) & (centre - 0.5 * ball >= gear.root_circle_radius) & (centre + 0.5 * ball >= gear.tip_radius)
     over = jnp.where(outside, 2 * centre * _offset(gear) + ball, jnp.nan)
-    return Measures(teeth, missing(0.5 * first, first), ball, missing(touched, over))
+    fits = jnp.where(_across(gear, first) <= gear.face_width, first, jnp.nan)
+    return Measures(teeth, missing(_half_span(gear, first), fits), ball, missing(touched, over))
 
 
 def allowance_of_span(gear: Gear, teeth: int, measured: Numbers) -> Float[Array, "..."]:
@@ -167,7 +187,6 @@ def allowance_of_balls(gear: Gear, ball: Given, measured: Numbers) -> Float[Arra
     """
     check("allowance_of_balls", "ball", ball, "mm", low=0.0, open_low=True)
     measured = real(measured)
-    check_spur("allowance_of_balls", gear)
     ratio = (measured - ball) / (2 * gear.base_radius * _offset(gear))
     least = concrete(2 * gear.base_radius * _offset(gear) + ball)
     check("allowance_of_balls", "measured", measured, "mm", low=None if least is None else float(least), open_low=True)
@@ -183,10 +202,10 @@ def allowance_of_balls(gear: Gear, ball: Given, measured: Numbers) -> Float[Arra
 
 
 def _thick(gear: Gear, ball: Given, allowance: Given) -> Scalar:
-    """inv(alpha_K) of a ball between the flanks of a gear with an allowance [mm]."""
+    """inv(alpha_Kt) of a ball between the flanks of a gear with an allowance [mm]."""
     tangent = jnp.tan(jnp.deg2rad(gear.pressure_angle))
     space = (jnp.pi / 2 - 2 * gear.profile_shift * tangent - allowance / gear.module) / gear.teeth
-    return involute(tangent) + ball / (2 * gear.base_radius) - space
+    return _pitch_involute(gear) + ball / (2 * gear.base_radius * jnp.cos(gear.base_helix_angle)) - space
 
 
 def _missing(tangent: Scalar, wanted: Scalar) -> Scalar:

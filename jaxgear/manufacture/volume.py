@@ -12,7 +12,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..contact import MeshCycle, Side
-from ..geometry import check_spur, outline
+from ..geometry import outline
 from ..metrics import Quantity, Vocabulary, gear_volume, removed_at
 from ..microgeometry import AbstractCurve, AbstractModification, Linear, NoModification, Quadratic, TipRelief
 from ..numerics import Given, check, concrete, program, real, safe_divide
@@ -86,11 +86,12 @@ def ground_volume(side: Side, modification: AbstractModification, *, stock: Give
 def ground_area(side: Side) -> Scalar:
     """Area of all flanks of one gear from the form circle to the tip, over its face [mm^2].
 
-    2 z b (L_tip^2 - L_form^2) / (2 r_b): the volume of any grinding stock is its thickness times this.
+    2 z b (L_tip^2 - L_form^2) / (2 r_b cos(beta_b)): every point of an involute helicoid is inclined to the transverse
+    section by the base helix angle. The volume of any grinding stock is its thickness times this.
     """
-    check_spur("ground_area", side.gear)
     form, tip = outline(side.gear).form_roll_length, side.tip_roll_length
-    return 2 * side.gear.teeth * side.face_width * (tip**2 - form**2) / (2 * side.base_radius)
+    profile = (tip**2 - form**2) / (2 * side.base_radius)
+    return 2 * side.gear.teeth * side.face_width * profile / jnp.cos(side.gear.base_helix_angle)
 
 
 def relative_volume(side: Side, modification: AbstractModification, *, parabolic: bool = False) -> Scalar:

@@ -15,6 +15,7 @@ from ..contact import Mesh, MeshCycle, Side
 from ..manufacture import helix_trace, profile_trace
 from ..metrics import flank_surface, removed_at
 from ..microgeometry import AbstractModification, NoModification
+from ..numerics import over_slices
 from ..tolerance import ToleranceClass
 from .figure import (
     ABOVE,
@@ -31,7 +32,7 @@ from .figure import (
     report_axes,
     styled,
 )
-from .mesh_cycle import PATH_LABEL, pair_history
+from .mesh_cycle import PATH_LABEL, middle_path, pair_history
 
 WIDTH = 150.0  # of the two panels together [mm]
 _BAND = "ISO 1328 tolerance about "  # the name of the design
@@ -264,6 +265,8 @@ _FACE_LABEL, _PRESSURE_LABEL = "face coordinate [mm]", "flank pressure [MPa]"
 def pressure_map(cycle: MeshCycle, ax: Axes | None = None) -> Axes:
     """Hertzian pressure [MPa] of one pair over its path of contact and the face width; white where the flanks part.
 
+    Of helical gears a pair touches along inclined lines: those at the position of the largest line load are drawn.
+
     Args:
         cycle: solved cycle, of several slices to show more than one row.
         ax: Axes to draw into; None for a new figure.
@@ -272,6 +275,8 @@ def pressure_map(cycle: MeshCycle, ax: Axes | None = None) -> Axes:
     contact = cycle.kinematics.path_of_contact
     with report_axes(ax) as ax:
         colour_bar(_draw(ax, path, face, flank, None), ax, _PRESSURE_LABEL, pad=0.02)
+        for line in _contact_lines(cycle):
+            ax.plot(line, face, color="black", linewidth=0.7)
         mark_path(ax, contact, zorder=3)
         air = 0.05 * float(contact.base_pitch)
         ax.set_xlim(float(contact.start) - air, float(contact.end) + air)
@@ -282,7 +287,8 @@ def pressure_map(cycle: MeshCycle, ax: Axes | None = None) -> Axes:
 def contact_pattern(cycle: MeshCycle, ax: Panels | None = None) -> np.ndarray:
     """Contact pattern: Hertzian pressure [MPa] over the roll angle and the face width of pinion and wheel.
 
-    Each over the active profile, from its start on the left to the tip on the right; white where the flanks part.
+    Each over the active profile, from its start on the left to the tip on the right; white where the flanks part. Of
+    helical gears the contact lines at the position of the largest line load are drawn.
 
     Args:
         cycle: solved cycle, of several slices to show more than one row.
@@ -297,6 +303,8 @@ def contact_pattern(cycle: MeshCycle, ax: Panels | None = None) -> np.ndarray:
         for panel, title, side, sign in zip(panels, ("pinion", "wheel"), cycle.sides, (1.0, -1.0)):
             pitch, base = float(side.pitch_roll_length), float(side.base_radius)
             image = _draw(panel, np.rad2deg((pitch + sign * path) / base), face, flank, most)
+            for line in _contact_lines(cycle):
+                panel.plot(np.rad2deg((pitch + sign * line) / base), face, color="black", linewidth=0.7)
             ends = (float(length) for length in (side.start_roll_length, side.tip_roll_length))
             panel.set_xlim(*np.rad2deg(np.array([*ends]) / base))
             panel.set(ylim=(face[0], face[-1]), xlabel=f"roll angle of the {title} [deg]")
@@ -306,21 +314,44 @@ def contact_pattern(cycle: MeshCycle, ax: Panels | None = None) -> np.ndarray:
 
 
 def _pressed(cycle: MeshCycle) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Edges of path positions and slices [mm], and the pressure between them [MPa]; NaN where the flanks part."""
+    """Edges of path positions at the ends of the slices and of the slices [mm], shapes (slices + 1, edges) and (slices
+    + 1,), and the pressure between them [MPa]; NaN where the flanks part.
+    """
     path, flank = pair_history(cycle, cycle.contact_pressure)
-    step = path[1] - path[0]
-    face = cycle.kinematics.resolution.slice_edges * float(cycle.kinematics.pair.face_width)
-    return np.append(path, path[-1] + step) - 0.5 * step, face, np.where(flank > 0, flank, np.nan)
+    step, face = path[1] - path[0], _ends(cycle)
+    middle = np.append(path, path[-1] + step) - 0.5 * step
+    ahead = face * float(cycle.kinematics.pair.path_slope)
+    return middle + ahead[:, None], face, np.where(flank > 0, flank, np.nan)
+
+
+def _ends(cycle: MeshCycle) -> np.ndarray:
+    """Where slices end over the face [mm]."""
+    return cycle.kinematics.resolution.slice_edges * float(cycle.kinematics.pair.face_width)
+
+
+def _contact_lines(cycle: MeshCycle) -> list[np.ndarray]:
+    """Path positions [mm] of all pairs of helical gears where slices end, at the position of the largest line load."""
+    if not cycle.kinematics.helical:
+        return []
+    middle = middle_path(cycle)[:, _heaviest(cycle)[1]]
+    contact = cycle.kinematics.path_of_contact
+    lines = middle[:, None] + _ends(cycle) * float(cycle.kinematics.pair.path_slope)
+    on_path = (lines >= float(contact.start)) & (lines <= float(contact.end))
+    return [np.where(inside, line, np.nan) for line, inside in zip(lines, on_path) if inside.any()]
 
 
 def _draw(ax: Axes, along: np.ndarray, face: np.ndarray, flank: np.ndarray, most: float | None) -> ScalarMappable:
     ax.grid(False)
+    across = np.broadcast_to(face[:, None], along.shape)
     # cividis: even in lightness, so that it reads the same in grey and for every kind of colour vision
-    return ax.pcolormesh(along, face, flank, cmap="cividis_r", vmin=0, vmax=most)
+    return ax.pcolormesh(along, across, flank, cmap="cividis_r", vmin=0, vmax=most)
 
 
 def line_load(cycle: MeshCycle, ax: Axes | None = None, *, position: int | None = None) -> Axes:
     """Line load [N/mm] of every loaded pair over the face at one mesh position, the mean over the face beside it.
+
+    Of helical gears, whose pairs lie in part of the face only, that of all pairs together is drawn too, and the mean is
+    its.
 
     Args:
         cycle: solved cycle of several slices.
@@ -331,12 +362,17 @@ def line_load(cycle: MeshCycle, ax: Axes | None = None, *, position: int | None 
     load = np.asarray(cycle.line_load)[:, :, where]
     face, width = (np.asarray(of) for of in (cycle.kinematics.face_coordinate, cycle.kinematics.slice_width))
     with report_axes(ax) as ax:
-        for index, pair in enumerate(np.flatnonzero(load.max(axis=1) > 0)):
-            style = marker_style(index)
-            mean = np.average(load[pair], weights=width)
-            name = f"pair {_place(cycle, int(pair), where)}, K = {load[pair].max() / mean:.2f}"
-            ax.plot(face, load[pair], label=name, **style)
-            ax.axhline(mean, color=style["color"], linewidth=0.6, zorder=0.6)
+        loaded = [int(pair) for pair in np.flatnonzero(load.max(axis=1) > 0)]
+        loads = [(f"pair {_place(cycle, pair, where)}", load[pair]) for pair in loaded]
+        if cycle.kinematics.helical:
+            loads.append(("all pairs", load.sum(axis=0)))
+        for index, (name, curve) in enumerate(loads):
+            style, mean = marker_style(index), np.average(curve, weights=width)
+            if not cycle.kinematics.helical:
+                name = f"{name}, K = {curve.max() / mean:.2f}"
+            ax.plot(face, curve, label=name, **style)
+            if not cycle.kinematics.helical or index == len(loaded):
+                ax.axhline(mean, color=style["color"], linewidth=0.6, zorder=0.6)
         ax.set(ylim=(0, None), ylabel="line load [N/mm]")
         _finish(ax, cycle, where)
     return ax
@@ -346,8 +382,9 @@ def face_gap(cycle: MeshCycle, mesh: Mesh, ax: Axes | None = None, *, position: 
     """Gap [um] between the flanks of the most loaded pair over the face at one mesh position, unloaded and under load.
 
     Unloaded it is that of modifications, misalignment and other meshes on the shafts, from where the flanks touch
-    first; on bent shafts the same with what the load of this mesh makes of shafts, bearings and housing, where they
-    deflect; under load what is left where the flanks do not touch.
+    first; of helical gears where the pair is on the path of contact; on bent shafts the same with what the load of this
+    mesh makes of shafts, bearings and housing, where they deflect; under load what is left where the flanks do not
+    touch.
 
     Args:
         cycle: solved cycle of several slices.
@@ -360,14 +397,18 @@ def face_gap(cycle: MeshCycle, mesh: Mesh, ax: Axes | None = None, *, position: 
         where = position
         pair = int(np.asarray(cycle.line_load)[:, :, where].max(axis=1).argmax())
     unloaded, opening = (np.asarray(of)[pair, :, where] for of in (mesh.held(cycle.gap), cycle.opening))
+    if cycle.kinematics.helical:
+        beyond = np.asarray(cycle.kinematics.contact_outside)[pair, :, where] > 0
+        unloaded, opening = np.where(beyond, np.nan, unloaded), np.where(beyond, np.nan, opening)
     face = np.asarray(cycle.kinematics.face_coordinate)
     curves = {"unloaded": unloaded}
     if mesh.support is not None:
-        force = np.asarray(cycle.line_load * mesh.lever[:, None] * mesh.slice_width[:, None])[:, :, where].sum(axis=0)
+        lever = over_slices(mesh.lever)
+        force = np.asarray(cycle.line_load * lever * mesh.slice_width[:, None])[:, :, where].sum(axis=0)
         bent = np.asarray(mesh.support.influence(mesh.face_coordinate)) @ force
         if bent.any():
-            curves["on bent shafts"] = unloaded + float(mesh.lever[pair, where]) * bent
-    curves = {name: curve - curve.min() for name, curve in curves.items()}
+            curves["on bent shafts"] = unloaded + np.asarray(lever)[pair, :, where] * bent
+    curves = {name: curve - np.nanmin(curve) for name, curve in curves.items()}
     curves["under load"] = np.maximum(opening, 0.0)
     with report_axes(ax) as ax:
         for index, (name, curve) in enumerate(curves.items()):
@@ -385,7 +426,8 @@ def _heaviest(cycle: MeshCycle) -> tuple[int, int]:
 
 
 def _place(cycle: MeshCycle, pair: int, position: int) -> str:
-    return f"{float(np.asarray(cycle.kinematics.path)[pair, position]):+.2f} mm from the pitch point"
+    where = " at mid-face" if cycle.kinematics.helical else ""
+    return f"{float(middle_path(cycle)[pair, position]):+.2f} mm from the pitch point{where}"
 
 
 def _finish(ax: Axes, cycle: MeshCycle, position: int) -> None:

@@ -16,6 +16,20 @@ PATH_LABEL = "path of contact from the pitch point [mm]"
 PHASE_LABEL = "mesh phase [base pitches]"
 
 
+def middle_path(cycle: MeshCycle) -> np.ndarray:
+    """Path position of every pair in the middle of the face [mm], shape (pairs, positions)."""
+    kinematics = cycle.kinematics
+    path = np.asarray(kinematics.contact_path)
+    if not kinematics.helical:
+        return path
+    return path[:, 0] - float(kinematics.face_coordinate[0] * kinematics.pair.path_slope)
+
+
+def path_label(cycles: Iterable[MeshCycle]) -> str:
+    """What positions of pairs on the path of contact are: of helical gears those in the middle of the face."""
+    return PATH_LABEL.replace(" [", ", mid-face [") if any(cycle.kinematics.helical for cycle in cycles) else PATH_LABEL
+
+
 def pair_history(cycle: MeshCycle, values: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
     """What one pair goes through from first to last contact.
 
@@ -27,9 +41,10 @@ def pair_history(cycle: MeshCycle, values: ArrayLike) -> tuple[np.ndarray, np.nd
         values: shape (pairs, ..., positions).
 
     Returns:
-        the path positions [mm], shape (pairs * positions,), and the values there, shape (..., pairs * positions).
+        the path positions in the middle of the face [mm], shape (pairs * positions,), and the values there, shape (...,
+        pairs * positions).
     """
-    path = np.asarray(cycle.kinematics.path).ravel()
+    path = middle_path(cycle).ravel()
     stages = np.moveaxis(np.asarray(values), 0, -2)
     stages = stages.reshape(*stages.shape[:-2], -1)
     order = np.argsort(path, kind="stable")
@@ -37,11 +52,11 @@ def pair_history(cycle: MeshCycle, values: ArrayLike) -> tuple[np.ndarray, np.nd
 
 
 def path_limits(cycles: Iterable[MeshCycle]) -> tuple[float, float]:
-    """Path range that holds the path of contact and all loaded corner contact of these cycles, with some air [mm]."""
+    """Path range that holds the path of contact and all loaded contact of these cycles, with some air [mm]."""
     low, high = [], []
     for cycle in cycles:
         contact = cycle.kinematics.path_of_contact
-        loaded = np.asarray(cycle.kinematics.path)[np.asarray(cycle.pair_force) > 0]
+        loaded = middle_path(cycle)[np.asarray(cycle.pair_force) > 0]
         air = 0.1 * float(contact.base_pitch)
         low.append(min(float(contact.start), loaded.min(initial=np.inf)) - air)
         high.append(max(float(contact.end), loaded.max(initial=-np.inf)) + air)
@@ -90,7 +105,7 @@ def load_sharing(cycles: Mapping[str, MeshCycle], ax: Axes | None = None) -> Axe
         if cycles:
             mark_path(ax, next(iter(cycles.values())).kinematics.path_of_contact)
             ax.set_xlim(path_limits(cycles.values()))
-        ax.set(ylim=(0, 1.05), xlabel=PATH_LABEL, ylabel="share of the pair in the load [-]")
+        ax.set(ylim=(0, 1.05), xlabel=path_label(cycles.values()), ylabel="share of the pair in the load [-]")
         legend_above(ax, distance=ABOVE_MARKS)
     return ax
 
@@ -124,7 +139,8 @@ def pressure(cycles: Mapping[str, MeshCycle], ax: Axes | None = None) -> Axes:
 
     Lines on the path of contact are that of the flanks. Dots before A and after E are that of the tip corners, another
     kind of contact, whose pressure depends on the tip edge radius; the legend has its largest value, to 10 MPa. It may
-    be many times that of the flanks: the scale is linear as far as these go, and logarithmic above.
+    be many times that of the flanks: the scale is linear as far as these go, and logarithmic above. Of helical gears,
+    whose slices come to the path of contact one after the other, either is drawn as long as any slice has it.
 
     Args:
         cycles: solved cycles by the name of their design; the points A to E are those of the first.
@@ -138,6 +154,8 @@ def pressure(cycles: Mapping[str, MeshCycle], ax: Axes | None = None) -> Axes:
             _, corner = pair_history(cycle, np.asarray(cycle.corner_pressure).max(axis=1))
             contact = cycle.kinematics.path_of_contact
             outside = (path < float(contact.start)) | (path > float(contact.end))
+            if cycle.kinematics.helical:
+                outside = flank == 0
             highest = max(highest, float(flank.max()))
             label = name
             if corner.max() > 0:
@@ -154,7 +172,7 @@ def pressure(cycles: Mapping[str, MeshCycle], ax: Axes | None = None) -> Axes:
             mark_path(ax, next(iter(cycles.values())).kinematics.path_of_contact)
             ax.set_xlim(path_limits(cycles.values()))
         ax.set_ylim(bottom=0)
-        ax.set(xlabel=PATH_LABEL, ylabel="pressure [MPa]")
+        ax.set(xlabel=path_label(cycles.values()), ylabel="pressure [MPa]")
         legend_above(ax, distance=ABOVE_MARKS)
     return ax
 
@@ -198,7 +216,9 @@ def meshing_diagram(cycle: MeshCycle, ax: Axes | None = None) -> Axes:
     # foot of the perpendicular from each centre on the line of action, then the centre
     centres = [np.array([0.0, -base[0] / np.cos(angle)]), np.array([0.0, base[1] / np.cos(angle)])]
     start, end = float(contact.start), float(contact.end)
-    path, force = np.asarray(cycle.kinematics.path), np.asarray(cycle.pair_force)
+    path, force = np.asarray(cycle.kinematics.contact_path), np.asarray(cycle.pair_force)
+    if cycle.kinematics.helical:  # slice by slice
+        force = np.asarray(cycle.line_load) * np.asarray(cycle.kinematics.slice_width)[:, None] * path.shape[1]
     touched = np.sort(path[force > _LOADED * float(cycle.force)])
     places = np.array([_place(s, along, centres, base, start, end) for s in touched])
     with report_axes(ax, height=_HIGH) as ax:

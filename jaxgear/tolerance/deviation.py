@@ -13,7 +13,6 @@ from jaxtyping import Array, Float, Int, PRNGKeyArray
 from ..contact import Mesh, RemovedMaterial, removed_material
 from ..contact.operating_point import Torque, operating_point_of
 from ..contact.slide import nominal_material
-from ..geometry import check_spur
 from ..microgeometry import AbstractModification, Flank, LeadSlope, NoModification, ProfileSlope
 from ..numerics import Checked, number, program, real, result, spread, whole
 from .limits import AbstractDistribution, GearTolerance, Tolerance, check_slices
@@ -95,7 +94,6 @@ def sample_deviations(tolerance: Tolerance, mesh: Mesh, samples: int, seed: int)
     Raises:
         ValueError: for lead deviations on a mesh of one slice, or less than one sample.
     """
-    check_spur("sample_deviations", *mesh.pair.gears)
     check_slices("sample_deviations", tolerance, mesh)
     whole("sample_deviations", "samples", samples)
     return _sample(tolerance, mesh, jax.random.key(seed), samples)
@@ -156,7 +154,6 @@ def flank_basis(mesh: Mesh, torque: Torque) -> Float[Array, "terms pairs slices 
     Around its nominal place, where the contact meets a deviation, that is linear, so that samples differ by their
     coefficients only: contacts slide down the slopes of the design and not down those of a deviation.
     """
-    check_spur("deviated_material", *mesh.pair.gears)
     unit = real(1.0).astype(mesh.slice_width.dtype)
     waves = jnp.eye(2 * HARMONICS, dtype=mesh.slice_width.dtype)
 

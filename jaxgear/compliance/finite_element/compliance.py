@@ -143,6 +143,7 @@ def finite_element_compliance(
             the number or the line.
     """
     check_plane_state(plane)
+    check_spur("finite_element_compliance", *pair.gears)
     folder = default_folder() if cache is True else Path(cache) if cache else None
     tables: dict[str, tuple[GearTable, ...]] = {}
     for name, path in (("pinion", pinion_table), ("wheel", wheel_table)):

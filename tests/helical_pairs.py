@@ -1,0 +1,23 @@
+"""The helical pair that several tests share, and its solved mesh."""
+
+from functools import cache
+
+import jaxgear as jg
+
+SIZES = jg.Resolution(positions=8, slices=5, pairs=4, newton_steps=12)
+TORQUE = 150.0
+
+
+def pair_of(beta=15.0, width=20.0, bores=(20.0, 100.0), **given) -> jg.GearPair:
+    """The pair of the finite elements that the model is compared with; a left-hand wheel."""
+    other = None if beta is None else -beta
+    return jg.GearPair(
+        jg.Gear(19, 3.0, face_width=width, helix_angle=beta, bore_diameter=bores[0], **given),
+        jg.Gear(48, 3.0, face_width=width, helix_angle=other, bore_diameter=bores[1], **given),
+    )
+
+
+@cache
+def solved(beta=15.0, slope=0.0) -> tuple[jg.Mesh, jg.MeshCycle]:
+    mesh = jg.prepare(pair_of(beta), resolution=SIZES)
+    return mesh, jg.solve(mesh, TORQUE, pinion=jg.LeadSlope(slope))
