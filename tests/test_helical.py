@@ -11,7 +11,7 @@ import pytest
 from helical_pairs import SIZES, TORQUE, pair_of, solved
 
 import jaxgear as jg
-from jaxgear import dynamics, manufacture, metrics, sizing, wear
+from jaxgear import manufacture, metrics, sizing, wear
 from jaxgear.compliance import finite_element_compliance, iso_stiffness
 from jaxgear.compliance.laws import LinearLaw
 from jaxgear.compliance.plate import axial_compliance
@@ -234,7 +234,6 @@ REFUSED = {
     "contact stress": lambda: metrics.nominal_contact_stress(solved()[1]),
     "root stress": lambda: metrics.root_stress(solved()[1]),
     "losses": lambda: metrics.loss_factor(solved()[1]),
-    "map of forces": lambda: dynamics.mesh_force(solved()[0], torque=TORQUE),
     "wear": lambda: wear.wear(solved()[0], TORQUE, coefficient=1e-18, revolutions=1e6),
     "form wheel": lambda: manufacture.wheel_profile(solved()[0].sides[0], jg.TipRelief(5.0, 2.0)),
 }

@@ -8,9 +8,9 @@ from jaxtyping import Array, Float
 
 from ..contact import Mesh, RemovedMaterial, removed_material, solve_removed
 from ..contact.mesh import prepare_from
-from ..geometry import tooth_thickness
+from ..geometry import Gear, GearPair, tooth_thickness
 from ..microgeometry import AbstractModification
-from ..numerics import program
+from ..numerics import changed, program
 
 Scalar = Float[Array, ""]
 Curve = Float[Array, " positions"]
@@ -75,16 +75,28 @@ def coast_flanks(mesh: Mesh, torque: Scalar, modification: Both) -> Flanks:
     DTE is measured from q = -j, and half of it again moves either gear. (R. G. Parker and co-workers name the
     phase between both sides: Y. Guo, R. G. Parker, Mech. Mach. Theory 78, 2014.)
 
+    Of helical gears every slice of the face, at a coordinate y, is at its own phase + y tan(beta_b) / p_bt, on which
+    its coast phase falls as above: coast flanks run as drive flanks of gears of the other hand do. Face coordinates
+    are those of the drive flanks.
+
     What holds the gears is known along the line of action of the drive flanks alone: coast flanks meet as on rigid,
     parallel shafts.
     """
     pair, sizes = mesh.pair, mesh.resolution
     first, shift, play = _coast_phase(mesh)
-    turned = prepare_from(first, pair, mesh.compliance, sizes, None, mesh.even)
+    turned = prepare_from(first, _other_hand(pair), mesh.compliance, sizes, None, mesh.even)
     pinion, wheel = modification
     removed = removed_material(turned, torque, pinion=pinion, wheel=wheel)
     order = (shift - jnp.arange(sizes.positions)) % sizes.positions
     return Flanks(turned, removed, order, play)
+
+
+def _other_hand(pair: GearPair) -> GearPair:
+    def turned(gear: Gear) -> Gear:
+        return gear if gear.helix_angle is None else changed(gear, helix_angle=-gear.helix_angle)
+
+    pinion, wheel = map(turned, pair.gears)
+    return changed(pair, pinion=pinion, wheel=wheel)
 
 
 @program

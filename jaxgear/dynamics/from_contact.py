@@ -14,9 +14,8 @@ from ..contact.mesh import prepare_from
 from ..contact.operating_point import Torque, operating_point_of
 from ..contact.solve import check_mesh, more_pairs_help
 from ..contact.status import Status, status_of
-from ..geometry import check_spur
 from ..microgeometry import AbstractModification
-from ..numerics import Given, check, concrete, real, whole
+from ..numerics import Given, check, concrete, over_slices, real, whole
 from ..numerics.programs import is_eager
 from .drive_and_coast import Both, Flanks, Static, coast_flanks, drive_flanks, static
 from .force import AbstractMeshForce
@@ -100,7 +99,6 @@ def force_and_mesh(
 ) -> tuple[AbstractMeshForce, Mesh]:
     """`mesh_force`, and the mesh that it was made on."""
     check_mesh("mesh_force", mesh)
-    check_spur("mesh_force", *mesh.pair.gears)
     torque = operating_point_of("mesh_force", torque, mesh.slice_width.dtype).torque
     check("mesh_force", "torque", torque, "N m", low=0.0, open_low=True)
     series = _number("compliance", compliance, "um/N", mesh, low=0.0)
@@ -143,11 +141,17 @@ def interpolated(deviation: Given, of: Mesh, mesh: Mesh) -> Float[Array, "pairs 
         raise ValueError(
             f"mesh_force: deviation has shape {jnp.shape(deviation)}, must be {wanted} (pairs, slices, positions)"
         )
-    # one pair follows the other on the path of contact, the last one first
-    there, here = (each.path[::-1].ravel() for each in (of, mesh))
-    rows = jnp.moveaxis(jnp.asarray(deviation)[::-1], 1, 0).reshape(of.resolution.slices, -1)
-    found = jax.vmap(lambda row: jnp.interp(here, there, row))(rows)
-    return jnp.moveaxis(found.reshape(len(rows), *mesh.path.shape), 0, 1)[::-1]
+
+    def rows(field):  # of every slice: one pair follows the other on the path of contact, the last one first
+        return jnp.moveaxis(field[::-1], 1, 0).reshape(field.shape[1], -1)
+
+    wide = of.resolution.slices
+    there, here = (
+        jnp.broadcast_to(path, (wide, path.shape[-1]))
+        for path in (rows(over_slices(each.kinematics.contact_path)) for each in (of, mesh))
+    )
+    found = jax.vmap(jnp.interp)(here, there, rows(jnp.asarray(deviation)))
+    return jnp.moveaxis(found.reshape(wide, -1, mesh.resolution.positions), 0, 1)[::-1]
 
 
 def _besides(deviation: Given | None, of: Mesh, mesh: Mesh) -> Array | float:

@@ -20,7 +20,7 @@ from .response import SpeedResponse
 from .runs import Run, design_runs, speed_runs
 from .speed_sweep import MOST_KICK, speed_sweep
 from .steady import SteadyForce, SteadyNumbers, differentiable, steady_force
-from .systems import inertia_of, on_bearings, torsional
+from .systems import DIRECTIONS, inertia_of, on_bearings, torsional
 
 Scalar = Float[Array, ""]
 Bearing = Float[Array, " directions"]
@@ -33,8 +33,7 @@ DAMPING_RATIO = 0.05
 # by kicks somewhat smaller than its own factor, which falls from about 4 at 1.35 times the natural frequency to 2.5 at
 # twice of it; near the fold where it ends the window is 0.3 wide and lies between 2.1 and 4.
 KICKS = (2.5, 3.0, 3.7)
-_AXES = ("directions",)  # along and across
-_DIRECTIONS = 2
+_AXES = ("directions",)  # along and across, and axial
 # Steps of a mesh cycle while its natural frequency is not known, since it is traced: 64 of its periods for one at four
 # times the mesh frequency.
 _STEPS = 256
@@ -56,10 +55,12 @@ class Dynamics(AbstractSettings):
             it.
         wheel_inertia: the same of the wheel.
         compliance: of the parts between the teeth and the inertias, in series with the mesh.
-        pinion_bearing: stiffness of the support of the pinion along and across the line of action; rigid without it.
-            The supports of both gears are given, or of none.
+        pinion_bearing: stiffness of the support of the pinion along and across the line of action, and with a third
+            number along the axis, in which it is rigid without; rigid without any of them. The supports of both gears
+            are given in as many directions, or of none.
         wheel_bearing: the same of the wheel.
-        pinion_bearing_damping: viscous damping of the support of the pinion along and across; none without it.
+        pinion_bearing_damping: viscous damping of the support of the pinion in the directions of its stiffness; none
+            without it.
         wheel_bearing_damping: the same of the wheel.
         model: of the mesh force.
         positions: mesh positions of the force, which is linear between them.
@@ -95,16 +96,21 @@ class Dynamics(AbstractSettings):
             raise ValueError("Dynamics: damping_ratio and damping are both given, must be one of them")
         if self.kick is not None and self.kicks is not None:
             raise ValueError("Dynamics: kick and kicks are both given, must be one of them")
-        supports = self.pinion_bearing, self.wheel_bearing
+        supports: Any = (self.pinion_bearing, self.wheel_bearing)
         if (supports[0] is None) != (supports[1] is None):
             raise ValueError("Dynamics: pinion_bearing and wheel_bearing must both be given, or none")
         for name in ("pinion_bearing", "wheel_bearing"):
-            damping = getattr(self, f"{name}_damping")
-            if damping is not None and supports[0] is None:
+            if getattr(self, f"{name}_damping") is not None and supports[0] is None:
                 raise ValueError(f"Dynamics: {name}_damping has no effect without pinion_bearing and wheel_bearing")
-            for given, of in ((getattr(self, name), name), (damping, f"{name}_damping")):
-                if given is not None and len(given) != _DIRECTIONS:
-                    raise ValueError(f"Dynamics: {of} has {len(given)} numbers, must be two: along and across")
+            for of in (name, f"{name}_damping"):
+                given = getattr(self, of)
+                if given is not None and len(given) not in DIRECTIONS:
+                    raise ValueError(
+                        f"Dynamics: {of} has {len(given)} numbers, must be two: along and across, or three with axial"
+                    )
+                if given is not None and given.shape != supports[0].shape:
+                    count = len(supports[0])
+                    raise ValueError(f"Dynamics: {of} has {len(given)} numbers, must be {count} as pinion_bearing")
         known = concrete(self.mesh_frequencies)
         if known is not None and (known[1:] <= known[:-1]).any():
             raise ValueError("Dynamics: mesh_frequencies must increase")

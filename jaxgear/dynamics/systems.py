@@ -15,7 +15,8 @@ from .oscillator import NEWTON, Excitation, Oscillator
 Scalar = Float[Array, ""]
 
 _MM = 1e-3  # in m
-_BEARING = "(pinion, wheel) x (along, across) x (along, across)"
+DIRECTIONS = 2, 3  # in which a bearing may give way: along and across the line of action, and along the axis
+_BEARING = "(2, 2, 2) or (2, 3, 3): of pinion and wheel, along, across[, axial]"
 
 
 def inertia_of(gear: Gear) -> Scalar:
@@ -137,17 +138,24 @@ def on_bearings(
     mean_stiffness: Given | None = None,
     excitation: Excitation | None = None,
 ) -> Oscillator:
-    """Two gears whose centres move on flexible bearings: five coordinates [um].
+    """Two gears whose centres move on flexible bearings: five coordinates [um], or seven with axial motion.
 
     In order: the relative rotation u = r_b1 theta_1 - r_b2 theta_2; the centre of the pinion along the line of action,
-    in the direction in which it pushes the wheel, and across; the centre of the wheel likewise. The DTE is
-    q = u + along_1 - along_2; the bearings carry the mesh force, so that at rest the pinion is displaced by -F / k_1
-    and the wheel by F / k_2.
+    in the direction in which it pushes the wheel, across, and along its axis, positive as face coordinates are; the
+    centre of the wheel likewise. A helical gear that moves along its axis screws out of the mesh, so that the DTE is
+
+        q = u + along_1 - along_2 - tan(beta_b) (axial_1 - axial_2)
+
+    with the base helix angle of the pinion, positive for a right hand. The bearings carry the mesh force F and the
+    axial force F tan(beta_b): at rest the pinion is displaced by -F / k_1 along the line of action and by
+    F tan(beta_b) / k_1 along its axis, the wheel the other way. Gears do not tilt: the moment of the axial force about
+    their centres is carried rigidly.
 
     Args:
         mesh_force, pair, torque, damping_ratio, damping, inertias, mean_stiffness, excitation: as for `torsional`.
-        bearing_stiffness: of the supports of pinion and wheel in (along, across) [N/um], symmetric, shape (2, 2, 2).
-        bearing_damping: likewise [N s/um]; None for none.
+        bearing_stiffness: of the supports of pinion and wheel [N/um], symmetric: in (along, across), shape (2, 2, 2),
+            where axial forces are carried rigidly; or in (along, across, axial), shape (2, 3, 3).
+        bearing_damping: likewise, of the same shape [N s/um]; None for none.
         masses: of the bodies that move on the bearings [kg], pinion and wheel; None for those of the bodies of
             `inertia_of`.
 
@@ -161,18 +169,25 @@ def on_bearings(
         owner, "masses", "kg", (_mass_of(pair.pinion), _mass_of(pair.wheel)) if masses is None else masses
     )
     held = _on_ground(owner, "bearing_stiffness", "N/um", bearing_stiffness, stiff=True)
+    directions = len(held) // 2
     damped = None
     if bearing_damping is not None:
         damped = _on_ground(owner, "bearing_damping", "N s/um", bearing_damping, stiff=False)
-    dtype = mass.dtype
+        if len(damped) != len(held):
+            raise ValueError(
+                f"{owner}: bearing_damping is of {len(damped) // 2} directions, must be of {directions} as "
+                "bearing_stiffness"
+            )
+    one = jnp.ones((1,), mass.dtype)
+    centre = jnp.concatenate([one, 0 * one, -pair.path_slope[None]])[:directions]
     return Oscillator(
         mesh_force=mesh_force,
-        mass=jnp.concatenate([mass[None], jnp.repeat(bodies, 2)]),
-        direction=jnp.asarray([1.0, 1.0, 0.0, -1.0, 0.0], dtype),
-        load=force * jnp.asarray([1.0, 0.0, 0.0, 0.0, 0.0], dtype),
+        mass=jnp.concatenate([mass[None], jnp.repeat(bodies, directions)]),
+        direction=jnp.concatenate([one, centre, -centre]),
+        load=force * jnp.zeros((1 + 2 * directions,), mass.dtype).at[0].set(1.0),
         mesh_damping=c,
-        stiffness=held,
-        damping=damped,
+        stiffness=_beside_rotation(held),
+        damping=None if damped is None else _beside_rotation(damped),
         excitation=excitation,
     )
 
@@ -221,10 +236,10 @@ def _damping(owner: str, mesh_force, mass, force, ratio, damping, stiffness) -> 
     return 2 * ratio * jnp.sqrt(stiffness * mass / NEWTON)
 
 
-def _on_ground(owner: str, name: str, unit: str, given: Any, *, stiff: bool) -> Float[Array, "5 5"]:
-    """Matrices of two bearings at the coordinates of `on_bearings`."""
+def _on_ground(owner: str, name: str, unit: str, given: Any, *, stiff: bool) -> Float[Array, "centres centres"]:
+    """Matrix of two bearings at the coordinates of both centres."""
     given = real(given)
-    if given.shape != (2, 2, 2):
+    if given.shape not in [(2, count, count) for count in DIRECTIONS]:
         raise ValueError(f"{owner}: {name} has shape {given.shape}, must be {_BEARING}")
     check(owner, name, given, unit)
     known = concrete(given)
@@ -235,5 +250,9 @@ def _on_ground(owner: str, name: str, unit: str, given: Any, *, stiff: bool) -> 
         if least < 0 or (stiff and least == 0):
             limit = "greater than 0" if stiff else "at least 0"
             raise ValueError(f"{owner}: {name} has an eigenvalue of {least:g} {unit}, must be {limit} {unit}")
-    held = jnp.zeros((5, 5), given.dtype)
-    return held.at[1:3, 1:3].set(given[0]).at[3:5, 3:5].set(given[1])
+    return jax.scipy.linalg.block_diag(*given)
+
+
+def _beside_rotation(of_centres: Float[Array, "centres centres"]) -> Float[Array, "coordinates coordinates"]:
+    """The matrix with that of the relative rotation, which nothing holds, in front."""
+    return jnp.pad(of_centres, ((1, 0), (1, 0)))
