@@ -17,6 +17,7 @@ from jaxgear.shafts import (
     integral_diameter,
     support,
 )
+from jaxgear.shafts.stepped_beam import shear_coefficient
 
 PINION = jg.Gear(teeth=19, module=3.0, face_width=18.0, bore_diameter=24.0)
 WHEEL = jg.Gear(teeth=48, module=3.0, face_width=18.0, bore_diameter=40.0)
@@ -25,6 +26,19 @@ LENGTH = 150.0
 TILTED = np.diag([300.0, 400.0, 0.0, 2e4, 3e4]) + 0.0
 TILTED[0, 4] = TILTED[4, 0] = 500.0
 TILTED[1, 3] = TILTED[3, 1] = -400.0
+
+
+E, NU = 206_000.0, 0.3
+G = E / (2 * (1 + NU))
+STIFF = 1e14  # N/um and N m/rad: what it gives is below every tolerance here
+
+
+def inertia(diameter, bore=0.0):
+    return np.pi / 64 * (diameter**4 - bore**4)
+
+
+def shear_area(diameter, bore=0.0):
+    return float(shear_coefficient(jnp.asarray(bore / diameter), jnp.asarray(NU))) * np.pi / 4 * (diameter**2 - bore**2)
 
 
 def two_stages(radial=500.0, diameter=36.0, housing=None, further=()):
@@ -65,7 +79,7 @@ def stage(clearance, radial=300.0, moment=40.0):
     return Gearbox([into, out], [GearMesh("p", "w")])
 
 
-def gearbox(radial=150.0, *, mirrored=False, modulus=206e3, housing=None, torque=50.0):
+def gearbox(radial=150.0, *, mirrored=False, modulus=206e3, housing=None, torque=50.0, pair=PAIR, **given):
     """One stage between bearings, its gears off the middle; `mirrored` about the plane across the shafts."""
 
     def at(position):
@@ -77,13 +91,13 @@ def gearbox(radial=150.0, *, mirrored=False, modulus=206e3, housing=None, torque
         material = jg.Material(elastic_modulus=modulus)
         return Shaft(name, sections[::-1] if mirrored else sections, bearings, [gear], [coupling], material=material)
 
-    pinion = MountedGear("pinion", PINION, at(45.0), integral_diameter(PINION))
-    wheel = MountedGear("wheel", WHEEL, at(45.0))
+    pinion = MountedGear("pinion", pair.pinion, at(45.0), integral_diameter(pair.pinion))
+    wheel = MountedGear("wheel", pair.wheel, at(45.0))
     shafts = [
         shaft("in", [(50.0, 30.0), (100.0, 26.0)], "AB", pinion, Coupling(at(LENGTH), torque)),
         shaft("out", [(150.0, 40.0)], "CD", wheel, Coupling(at(0.0))),
     ]
-    return Gearbox(shafts, [GearMesh("pinion", "wheel")], housing)
+    return Gearbox(shafts, [GearMesh("pinion", "wheel")], housing, **given)
 
 
 def over_shafts(x):

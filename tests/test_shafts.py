@@ -4,7 +4,7 @@ import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from gearboxes import PINION, WHEEL, two_stages
+from gearboxes import PINION, STIFF, WHEEL, E, G, inertia, shear_area, two_stages
 
 import jaxgear as jg
 from jaxgear.shafts import (
@@ -23,19 +23,6 @@ from jaxgear.shafts import (
     support,
 )
 from jaxgear.shafts.stepped_beam import shear_coefficient
-
-E, NU = 206_000.0, 0.3
-G = E / (2 * (1 + NU))
-STIFF = 1e14  # N/um and N m/rad: what it gives is below every tolerance here
-
-
-def inertia(diameter, bore=0.0):
-    return np.pi / 64 * (diameter**4 - bore**4)
-
-
-def shear_area(diameter, bore=0.0):
-    return float(shear_coefficient(jnp.asarray(bore / diameter), jnp.asarray(NU))) * np.pi / 4 * (diameter**2 - bore**2)
-
 
 NO_LOAD = ShaftLoad(0.0)
 NO_TORQUE = Coupling(0.0, 0.0), Coupling(0.0)

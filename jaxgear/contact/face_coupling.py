@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Array, Bool, Float
 
 from ..compliance import AbstractCompliance, face_ends, face_kernel, few_modes, slice_basis
-from ..geometry import GearPair, check_spur, is_even
+from ..geometry import GearPair, is_even
 from ..geometry.outline import Outline
 from ..numerics import Other, SliceCoupling, concrete
 from .kinematics import Kinematics
@@ -161,7 +161,6 @@ def check_support(support: AbstractSupport | None, pair: GearPair, resolution: R
         raise TypeError(
             f"prepare: support is a {type(support).__name__}, must be a support: jaxgear.shafts.support makes one"
         )
-    check_spur("prepare: support", *pair.gears)  # no axial forces
     if resolution.slices == 1:
         raise ValueError(
             "prepare: support acts over the face, which a mesh of 1 slice cannot show: Resolution(slices=11)"

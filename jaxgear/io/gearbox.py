@@ -192,6 +192,9 @@ def support_of(
     if not own:
         raise DesignFileError("meshes", 'missing, one must have pinion = "pinion" and wheel = "wheel"')
     box = refused("meshes" if meshes else "shafts", Gearbox, made, given, None, direction)
+    if not pair.is_spur and box.turning(box.place(_OWN[0])[0]) < 0:
+        problem = "makes the helical pinion turn clockwise, must be counterclockwise, seen against z, as of every pair"
+        raise DesignFileError("layout.direction", f"{problem}: count positions on shafts from the other end")
     brought = float(box.pinion_torques()[own[0]])
     if not np.isclose(brought, torque, rtol=_SAME_TORQUE):
         raise DesignFileError("load.torque", f"{torque:g} N m must be {brought:g} N m, that of the couplings")

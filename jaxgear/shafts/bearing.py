@@ -38,7 +38,7 @@ class Bearing(AbstractBearing):
         name: of bearing and seat, which is how a housing names it.
         position: distance from the left end of the shaft [mm].
         radial: [N/um].
-        axial: [N/um]; 0 for a floating bearing.
+        axial: [N/um]; 0 for a floating bearing, which takes no axial force. Shafts of helical gears need one that does.
         tilting: against rotation about x and y [N m/rad]; 0 for a bearing that aligns itself.
         clearance: by which the shaft can move to every side before the bearing resists, half the diametral clearance
             [um]; None for none. See `operating_point` for what is made of it.

@@ -11,8 +11,8 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ..contact.status import Status, Statuses, status_of
-from ..geometry import GearPair, check_spur, margins
-from ..numerics import Checked, concrete, number, program, within_limits
+from ..geometry import Gear, GearPair, margins
+from ..numerics import Checked, changed, concrete, number, program, within_limits
 from .housing import Housing
 from .misalignment import Misalignment
 from .shaft import MountedGear, Shaft
@@ -122,9 +122,7 @@ class Gearbox(Checked):
                 _check_known("gear", name, [gear.name for shaft in self.shafts for gear in shaft.gears])
         if self.housing is not None:
             self._check_housing(self.housing)
-        _ = self.path
-        for index in range(len(self.meshes)):
-            check_spur("Gearbox", *self.pair(index).gears)  # no axial forces
+        _ = self.path, [self.pair(index) for index in range(len(self.meshes))]
         torques = concrete(_torques(self))
         if torques is None:
             return
@@ -174,10 +172,21 @@ class Gearbox(Checked):
         raise ValueError(f'Gearbox: gear "{gear}" is on no shaft')
 
     def pair(self, mesh: int) -> GearPair:
-        """The gears of a mesh, for `prepare`."""
+        """The gears of a mesh, for `prepare`; face coordinates run along z.
+
+        Helical gears whose pinion turns clockwise are given with the other hand: turning counterclockwise, as pairs do,
+        these have the same contact, their mirror image about a plane through both axes.
+        """
         given = self.meshes[mesh]
-        pinion, wheel = self.place(given.pinion)[1], self.place(given.wheel)[1]
-        return GearPair(pinion.gear, wheel.gear, given.center_distance, given.axial_offset)
+        (shaft, pinion), (_, wheel) = self.place(given.pinion), self.place(given.wheel)
+        gears = pinion.gear, wheel.gear
+        if self.turning(shaft) < 0:
+            gears = _other_hand(pinion.gear), _other_hand(wheel.gear)
+        return GearPair(*gears, given.center_distance, given.axial_offset)
+
+    def turning(self, shaft: int) -> int:
+        """1 for a shaft that turns counterclockwise, seen against z, -1 for the others."""
+        return self.path.turning[shaft] * (1 if self.direction == "counterclockwise" else -1)
 
     def pinion_torques(self) -> Float[Array, " meshes"]:
         """Torque on the pinion of every mesh [N m], by equilibrium from the couplings."""
@@ -203,6 +212,10 @@ class Gearbox(Checked):
                 f"Gearbox: {len(free)} couplings have no torque, must be 1, which takes the sum of the others"
             )
         return free[0]
+
+
+def _other_hand(gear: Gear) -> Gear:
+    return gear if gear.helix_angle is None else changed(gear, helix_angle=-gear.helix_angle)
 
 
 @program

@@ -151,44 +151,51 @@ class Acting(NamedTuple):
         shafts: of pinion and wheel.
         positions: of the middle of the common face on both shafts [mm].
         base_radii: [mm].
-        normal: from the pinion's flank to the wheel's, along the line of action, in x, y, z, rx, ry.
+        ways: of the force on pinion and wheel per force on the line of action, in x, y, z, rx, ry [N, N mm per N].
         half: half the common face width [mm].
     """
 
     shafts: tuple[int, int]
     positions: tuple[Scalar, Scalar]
     base_radii: tuple[Scalar, Scalar]
-    normal: Float[Array, "5"]
+    ways: tuple[Float[Array, "5"], Float[Array, "5"]]
     half: Scalar
 
 
 def acting(gearbox: Gearbox, mesh: int) -> Acting:
     """Where and in which direction the force of a mesh acts.
 
-    The pinion pushes the wheel forwards by cos(alpha_wt) and away from itself by sin(alpha_wt).
+    The pinion pushes the wheel forwards by cos(alpha_wt) and away from itself by sin(alpha_wt). Helical gears push each
+    other along their axes too, by F_ax = F tan(beta_b): the wheel away from the end that enters the mesh first. That
+    force acts at the pitch point, wherever on the path of contact the teeth touch, and tilts both shafts by F_ax r_w.
     """
     given, pair = gearbox.meshes[mesh], gearbox.pair(mesh)
     (first, pinion), (second, wheel) = gearbox.place(given.pinion), gearbox.place(given.wheel)
-    turning = gearbox.path.turning[first] * (1 if gearbox.direction == "counterclockwise" else -1)
     angle, alpha = jnp.deg2rad(given.angle), pair.working_pressure_angle
     away = jnp.stack([jnp.cos(angle), jnp.sin(angle)])
-    forwards = turning * jnp.stack([-jnp.sin(angle), jnp.cos(angle)])
-    normal = jnp.concatenate([jnp.cos(alpha) * forwards + jnp.sin(alpha) * away, jnp.zeros(3)])
+    forwards = gearbox.turning(first) * jnp.stack([-jnp.sin(angle), jnp.cos(angle)])
+    normal = jnp.cos(alpha) * forwards + jnp.sin(alpha) * away
+    axial = jnp.zeros(()) if pair.pinion.helix_angle is None else -pair.path_slope
     radii = pair.pinion.base_radius, pair.wheel.base_radius
+
+    def on(sign: float, radius: Scalar) -> Float[Array, "5"]:
+        x, y = -sign * radius / jnp.cos(alpha) * away  # of the pitch point, from the axis
+        return sign * jnp.concatenate([normal, jnp.stack([axial, y * axial, -x * axial])])
+
     middles = pair.face_middles
     positions = pinion.position + middles[0], wheel.position + middles[1]
-    return Acting((first, second), positions, radii, normal, 0.5 * pair.face_width)
+    return Acting((first, second), positions, radii, (on(-1.0, radii[0]), on(1.0, radii[1])), 0.5 * pair.face_width)
 
 
 def mesh_patterns(gearbox: Gearbox, mesh: int, y: Slices) -> list[Patterns]:
     """Unit forces between the flanks at face coordinates, for every shaft."""
     where = acting(gearbox, mesh)
-    each = jnp.eye(len(y))[:, None, :] * where.normal[None, :, None]
     found = []
     for index in range(len(gearbox.shafts)):
         if index in where.shafts:
             side = where.shafts.index(index)
-            found.append(Patterns(where.positions[side] + y, each if side else -each))
+            each = jnp.eye(len(y))[:, None, :] * where.ways[side][None, :, None]
+            found.append(Patterns(where.positions[side] + y, each))
         else:
             found.append(Patterns(jnp.zeros(0), jnp.zeros((0, 5, len(y)))))
     return found
@@ -205,9 +212,9 @@ def load_pattern(gearbox: Gearbox, without: int | None = None) -> list[Patterns]
             continue
         where = acting(gearbox, mesh)
         force = 1e3 * torques[mesh] / where.base_radii[0]
-        for side, sign in enumerate((-1.0, 1.0)):
+        for side in range(2):
             at[where.shafts[side]].extend(where.positions[side] + where.half * (2 * points - 1))
-            vectors[where.shafts[side]].extend(sign * force * weights[:, None] * where.normal[None])
+            vectors[where.shafts[side]].extend(force * weights[:, None] * where.ways[side][None])
     for index, shaft in enumerate(gearbox.shafts):
         at[index].extend(load.position for load in shaft.loads)
         vectors[index].extend(load.vector for load in shaft.loads)

@@ -23,7 +23,7 @@ class BearingReactions(Checked):
 
     Attributes:
         names: of the bearings.
-        force: of the shafts on the bearings, N and N mm.
+        force: of the shafts on the bearings, N and N mm; printed are the radial and the axial one.
         shaft: displacement of the shafts at the bearings, um and mrad.
         seat: displacement of the housing there, um and mrad.
     """
@@ -34,13 +34,13 @@ class BearingReactions(Checked):
     seat: Float[Array, "bearings directions"] = result("um")
 
     def __str__(self) -> str:
-        head = f"{'bearing':12}{'force N':>12}{'x':>10}{'y':>10}{'z':>10}" + "".join(
+        head = f"{'bearing':12}{'force N':>12}{'axial N':>10}{'x':>10}{'y':>10}{'z':>10}" + "".join(
             f"{name:>10}" for name in ("seat x", "seat y", "seat z")
         )
         lines = [head + "   um"]
         for name, force, shaft, seat in zip(self.names, *map(np.asarray, (self.force, self.shaft, self.seat))):
             moved = "".join(f"{value:10.2f}" for value in (*shaft[:3], *seat[:3]))
-            lines.append(f"{name:12}{np.hypot(force[0], force[1]):12.1f}{moved}")
+            lines.append(f"{name:12}{np.hypot(force[0], force[1]):12.1f}{force[2]:10.1f}{moved}")
         return "\n".join(lines)
 
 

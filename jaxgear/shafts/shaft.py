@@ -218,7 +218,7 @@ class ShaftFacts(NamedTuple):
         tip: its tip diameter [mm].
         overlap: whether the faces of two gears have more than an end in common.
         held: whether the bearings resist every movement but that along the axis.
-        axial: whether they resist that too where something pushes.
+        axial: whether they resist that too where something pushes, as helical gears do.
     """
 
     length: Scalar
@@ -251,7 +251,8 @@ def facts_of(shaft: Shaft) -> ShaftFacts:
     bodies = [jnp.zeros(()) if gear.body_diameter is None else gear.body_diameter for gear in shaft.gears]
     tips = [2 * gear.gear.tip_radius for gear in shaft.gears]
     common = jnp.minimum(last[:, None], last[None]) - jnp.maximum(first[:, None], first[None])
-    pushed = jnp.max(jnp.abs(jnp.stack([jnp.zeros(()), *(load.force[2] for load in shaft.loads)])))
+    angles = [mounted.gear.helix_angle for mounted in shaft.gears if mounted.gear.helix_angle is not None]
+    pushed = jnp.max(jnp.abs(jnp.stack([jnp.zeros(()), *(load.force[2] for load in shaft.loads), *angles])))
     held = _held(shaft)
     bending = np.array([0, 1, 3, 4])
     return ShaftFacts(
@@ -332,4 +333,6 @@ def _faults(shaft: Shaft, facts: ShaftFacts) -> Iterator[tuple[str, str]]:
         problem = "needs two that are radially stiff and apart, or one that is stiff against tilting too"
         yield "bearings", f"bearings {names} do not hold it: it {problem}"
     if not facts.axial:
-        yield "bearings", "an axial load needs a bearing of axial stiffness"
+        helical = [f'the axial force of gear "{each.name}"' for each in shaft.gears if not each.gear.is_spur]
+        what = helical[0] if helical else "an axial load"
+        yield "bearings", f"{what} needs a bearing of axial stiffness: give one an axial [N/um] above 0"

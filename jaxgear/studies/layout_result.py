@@ -288,13 +288,13 @@ class LayoutResult(AbstractStudyResult):
     def _bearings(self) -> Table:
         """Displacements of the shafts at the bearings."""
         found = {name: bearing_reactions(support.gearbox) for name, support in self.request.supports.items()}
-        header = "bearing", "force [N]", *(f"{way}, {name}" for name in found for way in "xy")
+        header = "bearing", "force [N]", "axial [N]", *(f"{way}, {name}" for name in found for way in "xy")
         result = Table(header, title="bearings: displacement of the shaft [um]")
         first = next(iter(found.values()))
         for number, name in enumerate(first.names):
             force = float(np.hypot(*np.asarray(first.force)[number, :2]))
             moved = [f"{float(each.shaft[number, way]):.2f}" for each in found.values() for way in range(2)]
-            result.add_row(name, f"{force:.0f}", *moved)
+            result.add_row(name, f"{force:.0f}", f"{float(first.force[number, 2]):.0f}", *moved)
         return result
 
     def write(self, folder: Path) -> None:
