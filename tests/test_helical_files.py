@@ -1,12 +1,16 @@
 """Helical pairs in files: design files with both hands, slices and variables; REXS; commands."""
 
+from dataclasses import replace
+
 import jax
 import numpy as np
 import pytest
 from design_texts import loaded, text
+from helical_pairs import pair_of
 
 import jaxgear as jg
-from jaxgear.io import DesignFileError, write_design
+from jaxgear.io import DesignFileError, read_rexs, write_design, write_rexs
+from jaxgear.io.rexs.values import frames
 
 ANGLE = "helix_angle = 15.0"
 OPEN = 'helix_angle = "beta"'
@@ -77,3 +81,111 @@ def test_a_helical_pair_is_written_and_read(load, tmp_path):
     write_design(path, pair, torque=50.0, pinion=jg.NoModification(), wheel=jg.NoModification())
     again = loaded(tmp_path, path.read_text()).pair()
     assert jax.tree.all(jax.tree.map(lambda a, b: bool(a == b), pair, again))
+
+
+PAIR = pair_of(tooth_thickness_allowance=-40.0, tooth_thickness_tolerance=20.0, tip_edge_radius=0.1)
+FLANKS = {
+    "pinion": jg.TipRelief(8.0, 2.7, jg.Linear()) + jg.LeadSlope(12.0) + jg.EndRelief(5.0, 4.0, side="negative"),
+    "wheel": jg.LeadCrowning(6.0) + jg.microgeometry.TabulatedFlank(
+        [4.0, 30.0], [-8.0, 1.0, 9.0], np.arange(6.0).reshape(2, 3)
+    ),
+}  # fmt: skip
+
+
+def same(one, other, tolerance=1e-9):
+    jax.tree.map(lambda a, b: np.testing.assert_allclose(a, b, rtol=tolerance, atol=1e-9), one, other)
+
+
+def removed(found, sign=1):
+    """What both flanks remove over roll lengths and face coordinates, or these with the other sign."""
+    share, face = np.meshgrid(np.linspace(0.02, 0.98, 7), sign * np.linspace(-9.5, 9.5, 9))
+    flanks = zip(frames(PAIR), (found["pinion"], found["wheel"]))
+    return np.stack([each.removed(flank, each.start + share * (each.tip - each.start), face) for each, flank in flanks])
+
+
+@pytest.mark.parametrize("name", ["pair.rexs", "pair.rexsj"])
+def test_a_helical_stage_comes_back_from_rexs(tmp_path, name):
+    write_rexs(tmp_path / name, PAIR, **FLANKS, torque=50.0, speed=1000.0)
+    found = read_rexs(tmp_path / name)
+    same(found.pair, with_numbers(PAIR), 1e-6)
+    np.testing.assert_allclose(removed(vars(found)), removed(FLANKS), atol=0.01)
+
+
+def with_numbers(pair):
+    """Diameters and centre distance in a file are numbers; bores are those of the pair."""
+    gears = [replace(gear, tip_diameter=2 * gear.tip_radius) for gear in pair.gears]
+    return replace(pair, pinion=gears[0], wheel=gears[1], center_distance=pair.working_center_distance)
+
+
+def test_left_flanks_meet_the_other_end_first(tmp_path):
+    """A pinion that drives with its left flanks is turned end for end: face coordinates change sign, the hand stays."""
+    path = tmp_path / "pair.rexs"
+    write_rexs(path, PAIR, **FLANKS)
+    text = path.read_text()
+    assert text.count(">right<") == 2
+    path.write_text(text.replace(">right<", ">left<"))
+    left, right = read_rexs(path), read_rexs(path, flank="right")
+    same(left.pair, right.pair)
+    np.testing.assert_allclose(removed(vars(left)), removed(vars(right), -1), atol=1e-9)
+    assert np.abs(removed(vars(left)) - removed(vars(right))).max() > 5.0
+    path.write_text("\n".join(line for line in text.splitlines() if "loaded_tooth_flank" not in line))
+    with pytest.raises(
+        DesignFileError, match=r"cylindrical_gear 3: modifies the ends .* choose left or right \(flank\)"
+    ):
+        read_rexs(path)
+
+
+def test_flanks_and_slopes_are_seen_from_the_datum_face(tmp_path):
+    """A slope of the left flank is that of the right one the other way, at whichever end they are looked at."""
+    path = tmp_path / "pair.rexs"
+    write_rexs(path, PAIR, pinion=jg.LeadSlope(12.0))
+    for end in ("negative", "positive"):
+        path.write_text(path.read_text().replace(">negative<", f">{end}<"))
+        assert [float(read_rexs(path, flank=side).pinion.amount) for side in ("right", "left")] == [12.0, -12.0]
+    path.write_text(path.read_text().replace(">positive<", ">negative<", 1))
+    with pytest.raises(DesignFileError, match=r"datum_face_orientation: must be that of gear 3: the same flanks"):
+        read_rexs(path)
+
+
+def test_the_base_helix_angle_says_the_same(tmp_path):
+    path = tmp_path / "pair.rexs"
+    write_rexs(path, PAIR)
+    text = path.read_text()
+    base = float(np.rad2deg(PAIR.pinion.base_helix_angle))
+    for gear in (1, -1):
+        text = text.replace(
+            f'"helix_angle_reference_diameter" unit="deg">{15.0 * gear}<',
+            f'"helix_angle_base_diameter" unit="deg">{base * gear}<',
+        )
+    path.write_text(text)
+    assert float(read_rexs(path).pair.pinion.helix_angle) == pytest.approx(15.0, abs=1e-9)
+
+
+EARLY = """<model version="1.0"><relations>
+<relation id="1" type="stage"><ref id="6" role="stage"/>
+<ref id="1" role="gear_1"/><ref id="2" role="gear_2"/></relation>
+<relation id="2" type="flank"><ref id="1" role="gear"/><ref id="3" role="left"/><ref id="3" role="right"/></relation>
+<relation id="3" type="flank"><ref id="2" role="gear"/><ref id="4" role="left"/><ref id="4" role="right"/></relation>
+</relations><components>
+<component id="6" name="" type="cylindrical_stage">
+<attribute id="center_distance" unit="mm">53.0</attribute></component>
+{gears}</components></model>
+"""
+GEAR = """<component id="{0}" name="" type="cylindrical_gear"><attribute id="normal_module" unit="mm">1.0</attribute>
+<attribute id="helix_angle_reference_diameter" unit="\u00b0">{1}</attribute>
+<attribute id="face_width" unit="mm">11.0</attribute><attribute id="number_of_teeth" unit="none">{2}</attribute>
+</component><component id="{3}" name="" type="flank_geometry">
+<attribute id="normal_pressure_angle" unit="\u00b0">20.0</attribute>
+<attribute id="addendum_modification_coefficient" unit="none">{4}</attribute></component>
+"""
+
+
+def test_files_that_knew_no_tools_have_the_rack_of_iso_53(tmp_path, caplog):
+    path = tmp_path / "early.rexs"
+    gears = GEAR.format(1, 30.0, 23, 3, 0.581) + GEAR.format(2, -30.0, 67, 4, 0.5131)
+    path.write_text(EARLY.format(gears=gears), encoding="utf-8")
+    found = read_rexs(path).pair
+    assert "names no tools, those of the rack of ISO 53 in Gear are taken: flank_geometry 3" in caplog.text
+    wanted = [jg.Gear(z, 1.0, 20.0, x, face_width=11.0, helix_angle=beta) for z, x, beta in
+              ((23, 0.581, 30.0), (67, 0.5131, -30.0))]  # fmt: skip
+    same(found, jg.GearPair(*wanted, 53.0))

@@ -343,7 +343,7 @@ DEPTH = '<attribute id="tip_relief_depth" unit="mm">0.006<'
 WIDTH = '<attribute id="face_width" unit="mm">20.0<'
 RACK = '<attribute id="tip_corner_radius_factor_reference_profile" unit="none">0.38</attribute>'
 REFUSED = {
-    "helical": (HELIX, HELIX.replace("0.0", "-12.5"), "helix_angle_reference_diameter: -12.5 deg must be 0 deg"),
+    "one hand": (HELIX, HELIX.replace("0.0", "-12.5"), "wheel helix_angle = -12.5 deg must be 12.5 deg"),
     "internal": (TEETH, TEETH.replace("19", "-19"), "number_of_teeth: is negative: an internal gear"),
     "ring gear": ('type="cylindrical_gear"', 'type="ring_gear"', "ring_gear 3: is an internal gear"),
     "protuberance": (RACK, RACK + attribute("protuberance_amount", "0.1"), "protuberance_amount: 0.1 must be 0"),
@@ -389,8 +389,8 @@ REFUSED = {
     "no component": ('<ref id="9" role="gear_2"', '<ref id="99" role="gear_2"', "names component 99, which"),
     "no gear": ('role="gear_2"', 'role="gear_3"', "cylindrical_stage 2: gear_2: missing"),
     "twice": ('<component id="4"', '<component id="3"', "material 3: is given twice in the file"),
-    "old": ('version="2.0.0"', 'version="1.3"', "is of REXS 1.3, must be of 1.4 to 2"),
-    "new": ('version="2.0.0"', 'version="3.0"', "is of REXS 3.0, must be of 1.4 to 2"),
+    "old": ('version="2.0.0"', 'version="1.3"', "is a modification of REXS 1.3, must be of 1.4 or later"),
+    "new": ('version="2.0.0"', 'version="3.0"', "is of REXS 3.0, must be of 1 to 2"),
     "no version": ('version="2.0.0"', 'version="DEV"', 'model: version: "DEV" is not a version of REXS'),
     "no id": ('<component id="4"', '<component id="four"', 'component: id: "four" is not a whole number'),
     "no flank": ('type="flank"', 'type="flanks"', "cylindrical_gear 3: has no left or right flank"),

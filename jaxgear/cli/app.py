@@ -50,8 +50,8 @@ app = typer.Typer(
     cls=_Commands,
     add_completion=False,
     pretty_exceptions_enable=False,
-    help="Flank design of spur gears by loaded tooth contact analysis. Exit codes: 0 success, 1 a contact solution did "
-    "not converge or a constraint is not met (results are written and flagged), 2 error (nothing is written), "
+    help="Flank design of involute gears by loaded tooth contact analysis. Exit codes: 0 success, 1 a contact solution "
+    "did not converge or a constraint is not met (results are written and flagged), 2 error (nothing is written), "
     "130 interrupted (a sweep resumes). Begin with jaxgear new. Guides: examples/guides/index.md of the source; "
     "python -m jaxgear.io prints every table and key of a design file.",
 )
@@ -80,6 +80,9 @@ def new(
     torque: Annotated[float, typer.Option(metavar="NM", help="Torque on the pinion in N m.", show_default=False)],
     face_width: Annotated[float, typer.Option(metavar="MM", help="Face width in mm.", show_default=False)],
     speed: Annotated[float | None, typer.Option(metavar="RPM", help="Speed of the pinion in rpm.")] = None,
+    helix_angle: Annotated[
+        float, typer.Option(metavar="DEG", help="Helix angle of the pinion in degrees, positive for a right hand.")
+    ] = 0.0,
 ) -> int:
     """Write a commented design file for a pair, which analyze and optimize take as it is.
 
@@ -87,7 +90,7 @@ def new(
     """
     with interrupt.importing():
         from .convert import new
-    new(file, teeth, module=module, torque=torque, face_width=face_width, speed=speed)
+    new(file, teeth, module=module, torque=torque, face_width=face_width, speed=speed, helix_angle=helix_angle)
     return OK
 
 

@@ -2,7 +2,7 @@
 
 import os
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import jax
 
@@ -92,12 +92,20 @@ def _say(target: Path, pair: GearPair) -> None:
 
 
 def new(
-    path: Path, teeth: tuple[int, int], *, module: float, torque: float, face_width: float, speed: float | None
+    path: Path,
+    teeth: tuple[int, int],
+    *,
+    module: float,
+    torque: float,
+    face_width: float,
+    speed: float | None,
+    helix_angle: float = 0.0,
 ) -> None:
     """Writes a design file; a file that is there is never replaced."""
     jax.config.update("jax_enable_x64", True)
+    given: dict[str, Any] = {"module": module, "torque": torque, "face_width": face_width, "speed": speed}
     with interrupt.held(f"{path} is there"):
-        pair = write_starter(path, teeth, module=module, torque=torque, face_width=face_width, speed=speed)
+        pair = write_starter(path, teeth, **given, helix_angle=helix_angle)
     terminal.say(
         f"{path}: {teeth[0]}/{teeth[1]} teeth, module {module:g} mm, centre distance "
         f"{float(pair.working_center_distance):.6g} mm; jaxgear optimize {path} finds its tip reliefs"

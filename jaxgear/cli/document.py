@@ -23,7 +23,7 @@ _GEOMETRY_NOTE = (
     "root form diameter to the tip form diameter, the mate's tip touches it down to the active root diameter."
 )
 _ASSUMED = (
-    "External involute spur gears; the load acts where both faces overlap.",
+    "External involute gears; the load acts where both faces overlap.",
     "The contact is frictionless, quasi-static and linear elastic; bores are fixed.",
     "Gear bodies are solid: thin rims, webs and spokes are not in the closed forms.",
     "The pressure of a tip corner is an estimate, which depends on the edge radius, and is given apart.",

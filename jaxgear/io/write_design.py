@@ -32,7 +32,7 @@ title = "{title}"
 teeth = {pinion}
 module = {module!r}
 face_width = {face_width!r}             # mm
-# profile_shift = 0.0           # x module
+{hand}# profile_shift = 0.0           # x module
 # bore_diameter = 20.0          # mm; half the root diameter where it is not given
 # quality_class = 6             # ISO 1328-1, for the band in the charts
 
@@ -43,7 +43,7 @@ face_width = {face_width!r}
 
 # [pair]
 # center_distance = {distance:.3f}     # mm; without backlash where it is not given
-# backlash = 50.0               # um on the line of action
+# backlash = 50.0               # um on the line of action, of helical gears normal to the flanks
 
 [load]
 torque = {torque!r}                 # N m on the pinion
@@ -71,12 +71,21 @@ curve = "parabolic"
 # objective = "ppte"            # or another quantity, such as "max_flank_pressure"; better small or large by its nature
 # constraint = [{{ of = "max_flank_pressure", high = 1200.0 }}]
 """
+_HAND = "helix_angle = {angle!r}   # deg, positive for a right hand; the wheel has the other\n"
+_SPUR = "# helix_angle = 15.0            # deg, positive for a right hand; the wheel has the other\n"
 _SPEED = "speed = {speed!r}                # rpm of the pinion\n"
 _NO_SPEED = "# speed = 1500.0                # rpm of the pinion, for temperatures, film and loss\n"
 
 
 def write_starter(
-    path: str | Path, teeth: tuple[int, int], *, module: float, torque: float, face_width: float, speed: float | None
+    path: str | Path,
+    teeth: tuple[int, int],
+    *,
+    module: float,
+    torque: float,
+    face_width: float,
+    speed: float | None,
+    helix_angle: float = 0.0,
 ) -> GearPair:
     """Writes a commented design file of a pair, which `jaxgear analyze` and `jaxgear optimize` take as it is.
 
@@ -87,6 +96,7 @@ def write_starter(
         torque: on the pinion [N m].
         face_width: of both gears [mm].
         speed: of the pinion [rpm]; None for none.
+        helix_angle: of the pinion [deg].
 
     Returns:
         the pair.
@@ -104,7 +114,10 @@ def write_starter(
     if speed is not None:
         check("new", "speed", speed, "rpm", low=0.0, open_low=True)
     compile_quickly()
-    pinion, wheel = (Gear(real(count), real(module), face_width=real(face_width)) for count in teeth)
+    width, hands = real(face_width), (helix_angle, -helix_angle)
+    pinion, wheel = (
+        Gear(real(count), real(module), face_width=width, helix_angle=real(hand)) for count, hand in zip(teeth, hands)
+    )
     pair = GearPair(pinion, wheel)
     rule = iso_relief(pair, torque)
     amount, length = float(rule.amount), float(rule.length)
@@ -117,6 +130,7 @@ def write_starter(
         face_width=face_width,
         distance=float(pair.working_center_distance),
         torque=torque,
+        hand=_HAND.format(angle=helix_angle) if helix_angle else _SPUR,
         speed=_NO_SPEED if speed is None else _SPEED.format(speed=speed),
         amount=amount,
         most=max(_MOST * amount, _LEAST_MOST),

@@ -147,6 +147,13 @@ _GEAR = (
     "tooth_thickness_allowance_um",
     "tooth_thickness_tolerance_um",
 )
+_HELICAL_GEAR = (
+    "helix_angle_deg",
+    "base_helix_angle_deg",
+    "transverse_module_mm",
+    "transverse_pressure_angle_deg",
+    "virtual_number_of_teeth",
+)
 _PAIR = (
     "center_distance_mm",
     "working_pressure_angle_deg",
@@ -164,6 +171,7 @@ _PAIR = (
     "least_backlash_on_line_of_action_um",
     "largest_backlash_on_line_of_action_um",
 )
+_HELICAL_PAIR = ("overlap_ratio", "total_contact_ratio", "normal_backlash_um")
 
 
 def gears(file: DesignFile) -> dict[str, dict[str, dict[str, Any]]]:
@@ -171,16 +179,19 @@ def gears(file: DesignFile) -> dict[str, dict[str, dict[str, Any]]]:
 
     Points of the path of contact are positions from the pitch point C, positive towards the tip of the pinion. The
     usable involute runs from the root form diameter to the tip form diameter, and the mate's tip touches it from the
-    active root diameter on.
+    active root diameter on. Of helical gears module and pressure angle are normal ones, and the base pitch and the
+    backlash on the line of action transverse ones.
     """
     # gears without backlash have it up to rounding, which is no -0
     choices = chosen(file)
-    shape, drawn = _numbers(file.pair(), choices)
+    pair = file.pair()
+    shape, drawn = _numbers(pair, choices)
+    helical = not pair.is_spur
     pinion, wheel, together = jax.tree.map(lambda number: np.where(np.abs(number) < 1e-9, 0.0, number), shape)
     geometry = {
-        "pinion": dict(zip(_GEAR, pinion, strict=True)),
-        "wheel": dict(zip(_GEAR, wheel, strict=True)),
-        "pair": dict(zip(_PAIR, together, strict=True)),
+        "pinion": dict(zip((*_GEAR, *_HELICAL_GEAR * helical), pinion, strict=True)),
+        "wheel": dict(zip((*_GEAR, *_HELICAL_GEAR * helical), wheel, strict=True)),
+        "pair": dict(zip((*_PAIR, *_HELICAL_PAIR * helical), together, strict=True)),
     }
     of = zip(("pinion", "wheel"), drawn, choices)
     return {"geometry": geometry, "drawing": {name: drawing(found, given[-1]) for name, found, given in of}}
@@ -213,7 +224,18 @@ def _numbers(pair: GearPair, choices):
 
 
 def _gear(gear: Gear, pitch: Scalar, lowest: Scalar, tip_clearance: Scalar) -> tuple[Scalar, ...]:
-    """`_GEAR`, of the roll lengths at the pitch point and at the end of the active profile [mm]."""
+    """`_GEAR` and `_HELICAL_GEAR`, of the roll lengths at the pitch point and at the end of the active profile [mm]."""
+    helical = (
+        ()
+        if gear.helix_angle is None
+        else (
+            gear.helix_angle,
+            jnp.rad2deg(gear.base_helix_angle),
+            gear.transverse_module,
+            jnp.rad2deg(gear.transverse_pressure_angle),
+            gear.virtual_teeth,
+        )
+    )
     return (
         gear.teeth,
         gear.module,
@@ -233,11 +255,21 @@ def _gear(gear: Gear, pitch: Scalar, lowest: Scalar, tip_clearance: Scalar) -> t
         tip_clearance,
         gear.tooth_thickness_allowance,
         gear.tooth_thickness_tolerance,
+        *helical,
     )
 
 
 def _together(pair: GearPair, contact: PathOfContact, backlash: Scalar) -> tuple[Scalar, ...]:
-    """`_PAIR`."""
+    """`_PAIR` and `_HELICAL_PAIR`."""
+    helical = (
+        ()
+        if pair.pinion.helix_angle is None
+        else (
+            pair.overlap_ratio,
+            contact.contact_ratio + pair.overlap_ratio,
+            backlash * jnp.cos(pair.pinion.base_helix_angle),
+        )
+    )
     return (
         pair.working_center_distance,
         jax.numpy.rad2deg(pair.working_pressure_angle),
@@ -253,4 +285,5 @@ def _together(pair: GearPair, contact: PathOfContact, backlash: Scalar) -> tuple
         contact.end,
         backlash,
         *pair.backlash_limits,
+        *helical,
     )

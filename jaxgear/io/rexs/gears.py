@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ...geometry import Gear, Material, check_spur
+from ...geometry import Gear, Material
 from ...manufacture import allowance_of_balls, measures, over_balls
 from ...numerics import real
 from ..errors import refused
@@ -19,6 +19,11 @@ _SHIFT = "addendum_modification_coefficient"
 _ALLOWANCES = "chordal_tooth_thickness_upper_deviation", "chordal_tooth_thickness_lower_deviation"
 _SPANS = "upper_backlash_allowance_referenced_to_span", "lower_backlash_allowance_referenced_to_span"
 _BALLS = "upper_backlash_allowance_balls_or_pins", "lower_backlash_allowance_balls_or_pins"
+_HANDS = "helix_angle_reference_diameter", "helix_angle_base_diameter"
+_ANGLE = 1e-3  # deg, by which angles in files are rounded
+_RACK = {"dedendum": "addendum_coefficient", "root_radius": "tip_corner_radius_factor"}  # of the tool
+_LENGTHS = {"addendum_coefficient": "addendum", "tip_corner_radius_factor": "tip_corner_radius"}
+_FINISHED = "flank_geometry"  # what a flank was before REXS 1.4, without its tool
 QUALITY = "global_tolerance_class_iso_1328_2013"
 # What a gear of the library has not: it must be absent or zero. (component, attribute, unit)
 _NOT_HERE = (
@@ -37,15 +42,28 @@ _ALIKE = 2e-3  # mm, by which diameters on a drawing are rounded
 
 
 def check_external(gear: Component) -> None:
-    """Refuses what is no external spur gear."""
+    """Refuses what is no external gear."""
     if gear.type != "cylindrical_gear":
         raise gear.refuse("", "is an internal gear, must be a cylindrical_gear with external teeth")
     if gear.needed("number_of_teeth", "none") < 0:
         raise gear.refuse("number_of_teeth", "is negative: an internal gear, must have external teeth")
-    for name in ("helix_angle_reference_diameter", "helix_angle_base_diameter"):
-        angle = gear.number(name, "deg")
-        if angle:
-            raise gear.refuse(name, f"{angle:g} deg must be 0 deg, a spur gear")
+
+
+def _helix_angle(gear: Component, pressure_angle: float) -> float:
+    """On the reference cylinder, positive for a right hand [deg], from itself or that on the base cylinder."""
+    reference, base = (gear.number(name, "deg") for name in _HANDS)
+    if base is None:
+        return reference or 0.0
+    # sin(beta_b) = sin(beta) cos(alpha_n)
+    sine = np.sin(np.deg2rad(base)) / np.cos(np.deg2rad(pressure_angle))
+    if not -1 < sine < 1:
+        raise gear.refuse(_HANDS[1], f"{base:g} deg is no helix of normal pressure angle {pressure_angle:g} deg")
+    angle = float(np.rad2deg(np.arcsin(sine)))
+    if reference is not None and abs(angle - reference) > _ANGLE:
+        raise gear.refuse(
+            _HANDS[1], f"{base:g} deg is {angle:g} deg on the reference circle, must be {reference:g} deg"
+        )
+    return angle if reference is None else reference
 
 
 def _tip_form(gear: Component, flank: Component) -> float | None:
@@ -70,7 +88,8 @@ def read_gear(model: Model, gear: Component, flank: Component) -> Gear:
     Raises:
         DesignFileError: for what is missing or not of the library.
     """
-    tool, settings = _manufacturing(model, flank)
+    made_by = _manufacturing(model, flank)
+    tool, settings = made_by or (flank, flank)
     for part in (gear, flank, tool, settings):
         for kind, name, unit in _NOT_HERE:
             if part.type == kind and (value := part.number(name, unit)):
@@ -95,15 +114,13 @@ def read_gear(model: Model, gear: Component, flank: Component) -> Gear:
         "addendum": flank.number("addendum_coefficient_basic_profile", "none"),
         "tip_edge_radius": gear.number(_EDGE, "mm"),
     }
-    if options["tip_diameter"] is None and options["addendum"] is None:
+    if options["tip_diameter"] is None and options["addendum"] is None and made_by:
         raise gear.refuse("tip_diameter", "missing")
     if options["bore_diameter"] == 0:
         raise gear.refuse("inner_diameter", "0 mm: give the diameter at which the body is held, that of the shaft")
-    rack = "addendum", "tip_corner_radius"
-    dedendum, radius = (
-        _relative(tool, f"{name}_{word}_reference_profile", f"{name}_reference_profile", module)
-        for name, word in zip(rack, ("coefficient", "factor"))
-    )
+    if made_by:
+        for field, name in _RACK.items():
+            options[field] = _relative(tool, f"{name}_reference_profile", f"{_LENGTHS[name]}_reference_profile", module)
     made: Gear = refused(
         gear.where(),
         Gear,
@@ -111,9 +128,8 @@ def read_gear(model: Model, gear: Component, flank: Component) -> Gear:
         module=module,
         pressure_angle=angle,
         profile_shift=profile_shift,
+        helix_angle=_helix_angle(gear, angle),
         face_width=gear.needed("face_width", "mm"),
-        dedendum=dedendum,
-        root_radius=radius,
         material=_material(model, gear),
         **{name: value for name, value in options.items() if value is not None},
     )
@@ -131,7 +147,6 @@ def write_gear(
     model: Model, gear: Gear, name: str, quality: int | None, material_name: str | None = None
 ) -> tuple[Component, list[Component]]:
     """Writes a gear; returns its component and those of its left and right flank."""
-    check_spur("write_rexs", gear)
     upper, tolerance = float(gear.tooth_thickness_allowance), float(gear.tooth_thickness_tolerance)
     limits = (upper, upper - tolerance) if upper or tolerance else (None, None)
     part = model.add(
@@ -139,7 +154,7 @@ def write_gear(
         name,
         number_of_teeth=(int(gear.teeth), "none"),
         normal_module=(gear.module, "mm"),
-        helix_angle_reference_diameter=(0.0, "deg"),
+        helix_angle_reference_diameter=(0.0 if gear.helix_angle is None else gear.helix_angle, "deg"),
         face_width=(gear.face_width, "mm"),
         tip_diameter=(2 * gear.tip_radius if gear.tip_diameter is None else gear.tip_diameter, "mm"),
         tip_form_diameter=(gear.tip_form_diameter, "mm"),
@@ -189,8 +204,15 @@ def write_gear(
     return part, flanks
 
 
-def _manufacturing(model: Model, flank: Component) -> tuple[Component, Component]:
-    """Tool and settings of the one step that makes a flank."""
+def without_tool(model: Model, flank: Component) -> bool:
+    """Whether a flank is of a time before tools were described."""
+    return flank.type == _FINISHED and not model.related("manufacturing_step", "workpiece", flank.id, "tool")
+
+
+def _manufacturing(model: Model, flank: Component) -> tuple[Component, Component] | None:
+    """Tool and settings of the one step that makes a flank; None `without_tool`."""
+    if without_tool(model, flank):
+        return None
     tools = model.related("manufacturing_step", "workpiece", flank.id, "tool")
     if len(tools) != 1:
         known = ", ".join(str(tool.id) for tool in tools) or "none"
@@ -230,9 +252,14 @@ def _material(model: Model, gear: Component) -> Material:
 
 
 def _nominal(gear: Gear) -> tuple[float, float]:
-    """Diameter of the reference circle and tooth thickness on its arc without an allowance [mm] (ISO 21771)."""
+    """Diameter of the reference circle and tooth thickness on its arc without an allowance [mm] (ISO 21771).
+
+    Both of the normal section, whose circle has the curvature of the reference cylinder there, d / cos(beta)^2.
+    """
     module, shift, angle = float(gear.module), float(gear.profile_shift), np.deg2rad(float(gear.pressure_angle))
-    return 2 * float(gear.pitch_radius), float(module * (0.5 * np.pi + 2 * shift * np.tan(angle)))
+    return 2 * float(gear.pitch_radius / gear.helix_cosine**2), float(
+        module * (0.5 * np.pi + 2 * shift * np.tan(angle))
+    )
 
 
 def _chordal(gear: Gear, limit: float | None) -> float | None:

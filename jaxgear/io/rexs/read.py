@@ -14,7 +14,7 @@ from ...geometry import GearPair
 from ...microgeometry import AbstractModification, NoModification
 from ..errors import DesignFileError, naming, refused
 from ..toml import content
-from .gears import QUALITY, check_external, read_gear, read_quality
+from .gears import QUALITY, check_external, read_gear, read_quality, without_tool
 from .json_form import parse_json
 from .read_flank import read_modification
 from .rexs_model import Component, Model, parse
@@ -22,7 +22,8 @@ from .topography import joined
 from .values import Frame, frames
 
 _LOG = logging.getLogger("jaxgear")
-_OLDEST, _NEWEST = (1, 4), (2,)
+_OLDEST, _NEWEST = (1,), (2,)
+_MODIFIED = (1, 4)  # since when modifications of flanks are those of today
 _ALIKE = 1e-9  # um
 _ALONG, _ACROSS = "position_of_profile_modification", "diameter_of_helix_modification"
 _GEOMETRY = (
@@ -62,11 +63,17 @@ def read_rexs(
     flank: Literal["left", "right"] | None = None,
     load_case: int | None = None,
 ) -> RexsPair:
-    """Reads an external spur pair from a REXS file of version 1.4 or later, in XML or JSON.
+    """Reads an external pair from a REXS file in XML or JSON; before version 1.4 without modifications.
 
     Both gears are taken as centred on each other. A gear without a material is of steel, and one without an inner
-    diameter has the bore that `Gear` gives it. A modification that is given at other places than the ends of the
-    library's flank goes on to these by its own law.
+    diameter has the bore that `Gear` gives it; flanks of files that knew no tools yet are those of the rack of `Gear`,
+    which is logged. A modification that is given at other places than the ends of the library's flank goes on to these
+    by its own law.
+
+    Helix angles are positive for a right hand. Left and right flanks are seen from the datum face (ISO 21771): a pinion
+    that drives with its right flanks turns clockwise from there. Face coordinates of the library are then those of the
+    file for a datum face at negative ones, and have the other sign where the left flanks touch or the datum face is at
+    the other end.
 
     Args:
         path: of the file.
@@ -76,7 +83,7 @@ def read_rexs(
 
     Raises:
         DesignFileError: for whatever is wrong with the file or not of this library, in one line that names component
-            and attribute: helical and internal gears, protuberance, chamfers, several tools, shapes of a relief without
+            and attribute: internal gears, protuberance, chamfers, several tools, shapes of a relief without
             a formula, missing data, other units, XML that is not well-formed or declares a document type.
     """
     file = Path(path)
@@ -85,6 +92,9 @@ def read_rexs(
         model = parse_json(held) if held.removeprefix(BOM_UTF8).lstrip()[:1] == b"{" else parse(held)
         found = _read(model, stage, flank, load_case)
     said = (part for several in (model.components, *model.cases.values()) for part in several.values())
+    if bare := [part for part in model.components.values() if without_tool(model, part)]:
+        shown = f"{bare[0].where()}, the first of {len(bare)}"
+        _LOG.warning("%s: names no tools, those of the rack of ISO 53 in Gear are taken: %s", file, shown)
     silent = list(dict.fromkeys(place for part in said for place in part.without_unit))
     if silent:
         shown = f"{silent[0]}, the first of {len(silent)}" if len(silent) > 1 else silent[0]
@@ -108,8 +118,14 @@ def _read(model: Model, stage: int | None, flank: str | None, load_case: int | N
     if common is not None and abs(common - width) > 1e-6 * width:
         problem = f"{common:g} mm must be the smaller face width, {width:g} mm: the gears are centred on each other"
         raise chosen.refuse("common_face_width", problem)
-    sides = zip(gears, flanks, frames(pair))
+    turned = [1, 1] if pair.is_spur else [_mirror(gear, flank) for gear in gears]
+    sides = [
+        (gear, face, replace(frame, mirror=mirror))
+        for gear, face, frame, mirror in zip(gears, flanks, frames(pair), turned)
+    ]
     on_pinion, on_wheel = (_modification(model, *side) for side in sides)
+    if not pair.is_spur:
+        _check_direction(gears, flank, turned, sides, (on_pinion, on_wheel))
     torque, speed = _load(model, chosen, gears[0], load_case)
     units = [part for part in model.components.values() if part.type == "gear_unit"]
     title = units[0].text("model_name") if units else ""
@@ -171,7 +187,7 @@ def _check_axes(gears: list[Component]) -> None:
 def _check_version(model: Model) -> None:
     version = tuple(int(part) for part in model.version.split("."))
     if version[:2] < _OLDEST or version[:1] > _NEWEST:
-        raise DesignFileError("", f"is of REXS {model.version}, must be of 1.4 to 2")
+        raise DesignFileError("", f"is of REXS {model.version}, must be of 1 to 2")
 
 
 def _one(found: list[Component], owner: Component, role: str) -> Component:
@@ -207,6 +223,8 @@ def _said(model: Model, flank: Component) -> list[str]:
 def _modification(model: Model, gear: Component, flank: Component, frame: Frame) -> AbstractModification:
     """The sum of the modifications of a flank."""
     parts = model.related("reference", "origin", flank.id, "referenced")
+    if parts and tuple(int(part) for part in model.version.split("."))[:2] < _MODIFIED:
+        raise parts[0].refuse("", f"is a modification of REXS {model.version}, must be of 1.4 or later")
     for name in (_ALONG, _ACROSS):
         places = {part.number(name, "mm"): part for part in parts if name in part.attributes}
         if len(places) > 1:
@@ -216,15 +234,51 @@ def _modification(model: Model, gear: Component, flank: Component, frame: Frame)
     for part in parts:
         if len(parts) > 1 and not part.flag("is_additive_modification", True):
             raise part.refuse("is_additive_modification", "must be true beside other modifications")
-    datum_face = gear.choice("datum_face_orientation", "negative", ["negative", "positive"])
-    frame = replace(frame, datum=-1 if datum_face == "negative" else 1)
+    frame = replace(frame, datum=_datum(gear))
     total = _sum(parts, frame)
     if "datum_face_orientation" not in gear.attributes:
-        other = _sum(parts, replace(frame, datum=1))
-        roll, face = np.meshgrid(np.linspace(frame.start, frame.tip, 33), np.linspace(-0.5, 0.5, 61) * frame.width)
-        if np.abs(frame.removed(total, roll, face) - frame.removed(other, roll, face)).max() > _ALIKE:
+        if _differ(frame, total, _sum(parts, replace(frame, datum=1))):
             raise gear.refuse("datum_face_orientation", "missing, the ends of the face are modified differently")
     return total
+
+
+def _differ(frame: Frame, one: AbstractModification, other: AbstractModification, sign: int = 1) -> bool:
+    """Whether two modifications remove something else, at face coordinates of the same or the other sign."""
+    roll, face = np.meshgrid(np.linspace(frame.start, frame.tip, 33), np.linspace(-0.5, 0.5, 61) * frame.width)
+    return bool(np.abs(frame.removed(one, roll, face) - frame.removed(other, roll, sign * face)).max() > _ALIKE)
+
+
+def _datum(gear: Component) -> int:
+    """At which end of the face the datum face is: -1 or 1."""
+    return -1 if gear.choice("datum_face_orientation", "negative", ["negative", "positive"]) == "negative" else 1
+
+
+def _mirror(gear: Component, flank: str | None) -> int:
+    """The sign of face coordinates, see `read_rexs`."""
+    return _datum(gear) if flank == "left" else -_datum(gear)
+
+
+def _check_direction(
+    gears: list[Component],
+    flank: str | None,
+    turned: list[int],
+    sides: list[tuple[Component, Component, Frame]],
+    modifications: tuple[AbstractModification, AbstractModification],
+) -> None:
+    """Refuses helical gears where it matters and is not known which end of the face enters the mesh first."""
+    uneven = [
+        gear
+        for (gear, _, frame), modification in zip(sides, modifications)
+        if _differ(frame, modification, modification, -1)
+    ]
+    if uneven and flank is None:
+        problem = (
+            "modifies the ends of its face differently, choose left or right (flank): a helical gear meets one first"
+        )
+        raise uneven[0].refuse("", problem)
+    if uneven and turned[0] != turned[1]:
+        problem = f"must be that of gear {gears[0].id}: the same flanks of helical gears are seen from there"
+        raise gears[1].refuse("datum_face_orientation", problem)
 
 
 def _sum(parts: list[Component], frame: Frame) -> AbstractModification:

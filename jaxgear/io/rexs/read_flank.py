@@ -147,7 +147,7 @@ def _helix_slope(part: Component, frame: Frame) -> Iterator[AbstractModification
         if start is None or end is None or not end > start:
             raise part.refuse("helix_evaluation_end", "must be given, and greater than helix_evaluation_start")
         length = end - start
-    yield LeadSlope(real(-frame.datum * _at_end(part, "helix_slope", frame.width, length, 1)))
+    yield LeadSlope(real(-frame.mirror * frame.datum * _at_end(part, "helix_slope", frame.width, length, 1)))
 
 
 def _topography(part: Component, frame: Frame) -> Iterator[AbstractModification]:

@@ -169,7 +169,7 @@ def flank_of(component: Component, frame: Frame) -> AbstractModification:
         given = f"{len(coordinate)} coordinates, {len(diameter)} diameters, {len(amount)} amounts"
         raise component.refuse(_POINTS, f"must be one per point, with its coordinate and diameter, not {given}")
     diameters, row = np.unique(diameter, return_inverse=True)
-    coordinates, column = np.unique(coordinate, return_inverse=True)
+    coordinates, column = np.unique(frame.mirror * coordinate, return_inverse=True)
     roll = frame.roll_length(diameters)
     if np.isnan(roll).any():
         below = f"{diameters[0]:.9g} mm must be at least {2 * frame.base_radius:.9g} mm, the base diameter"

@@ -102,7 +102,8 @@ class Frame:
         base_radius: of the gear.
         start, tip: roll lengths at both ends of the active profile.
         width: face width of the gear.
-        datum: -1 where the datum face is at negative face coordinates, 1 at positive ones.
+        datum: -1 where the datum face is at negative coordinates of the file, 1 at positive ones.
+        mirror: -1 where face coordinates of the library are those of the file with the other sign.
     """
 
     base_radius: float
@@ -110,6 +111,7 @@ class Frame:
     tip: float
     width: float
     datum: int = -1
+    mirror: int = 1
 
     def diameter(self, roll_length: ArrayLike) -> np.ndarray | np.floating:
         """Diameter at a roll length."""
@@ -122,12 +124,12 @@ class Frame:
         return np.where(below, np.nan, np.sqrt(np.maximum(square, 0.0)))
 
     def place(self, face: str, length: float) -> float:
-        """Face coordinate at a distance from the middle towards the "datum_face" or the "non_datum_face"."""
+        """Coordinate of the file at a distance from the middle towards the "datum_face" or the "non_datum_face"."""
         return self.datum * length if face == "datum_face" else -self.datum * length
 
     def side(self, face: str) -> Literal["negative", "positive"]:
         """At which face coordinates the "datum_face" or the "non_datum_face" is."""
-        return "negative" if self.place(face, 1.0) < 0 else "positive"
+        return "negative" if self.mirror * self.place(face, 1.0) < 0 else "positive"
 
     def removed(
         self, modification: AbstractModification, roll_length: ArrayLike, face_coordinate: ArrayLike

@@ -1,6 +1,7 @@
 """Writes a gear pair with its modifications, its load and what a loaded tooth contact has found as a REXS file."""
 
 from pathlib import Path
+from typing import Any
 
 import equinox as eqx
 import jax
@@ -91,7 +92,11 @@ def write_rexs(
         )
     )
     model.relate("stage", stage=stage, gear_1=gears[0], gear_2=gears[1])
-    data = [model.add("cylindrical_stage_gear_data", is_driving_gear=(first, "none")) for first in (True, False)]
+    # of helical gears the ends of the face differ: positive face coordinates are those of right flanks
+    touching: dict[str, Any] = {} if pair.is_spur else {"loaded_tooth_flank": ("right", "none")}
+    data = [
+        model.add("cylindrical_stage_gear_data", is_driving_gear=(first, "none"), **touching) for first in (True, False)
+    ]
     for gear, part in zip(gears, data):
         model.relate("stage_gear_data", stage=stage, gear=gear, stage_gear_data=part)
     for name, both, frame, modification in zip(("pinion", "wheel"), flanks, frames(pair), (pinion, wheel)):
