@@ -7,12 +7,12 @@ References:
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ..geometry import GearPair, check_spur, path_of_contact
+from ..geometry import GearPair, path_of_contact
 from ..numerics import Checked, Given, check, program, real, result
 
 Scalar = Float[Array, ""]
 
-# ISO 6336-1 clause 9: minimum flexibility q' of a pair [mm um/N] in 1/z1, 1/z2, x1 and x2
+# ISO 6336-1 clause 9: minimum flexibility q' of a pair [mm um/N] in 1/z_n1, 1/z_n2, x1 and x2
 _Q = (0.04723, 0.15551, 0.25791, -0.00635, -0.11654, -0.00193, -0.24188, 0.00529, 0.00182)
 _MODEL_FACTOR = 0.8  # C_M, measured to theoretical single stiffness
 _LIGHT_LOAD = 100.0  # line load [N/mm] below which c' falls with its fourth root
@@ -33,13 +33,12 @@ class IsoStiffness(Checked):
 
 
 def iso_stiffness(pair: GearPair, line_load: Given = _LIGHT_LOAD) -> IsoStiffness:
-    """Stiffness of ISO 6336-1 Method B.
+    """Stiffness of ISO 6336-1 Method B, of helical gears with their virtual numbers of teeth and times cos(beta).
 
     Args:
         pair: gear pair; the standard covers x1 >= x2 and -0.5 <= x1 + x2 <= 2.
         line_load: F_t K_A / b [N/mm]; below 100 N/mm the stiffness is reduced.
     """
-    check_spur("iso_stiffness", *pair.gears)
     check("iso_stiffness", "line_load", line_load, "N/mm", low=0.0)
     return _iso_stiffness(pair, real(line_load))
 
@@ -47,7 +46,7 @@ def iso_stiffness(pair: GearPair, line_load: Given = _LIGHT_LOAD) -> IsoStiffnes
 @program
 def _iso_stiffness(pair: GearPair, line_load: Scalar) -> IsoStiffness:
     pinion, wheel = pair.pinion, pair.wheel
-    z1, z2, x1, x2 = pinion.teeth, wheel.teeth, pinion.profile_shift, wheel.profile_shift
+    z1, z2, x1, x2 = pinion.virtual_teeth, wheel.virtual_teeth, pinion.profile_shift, wheel.profile_shift
     c1, c2, c3, c4, c5, c6, c7, c8, c9 = _Q
     q = c1 + c2 / z1 + c3 / z2 + c4 * x1 + c5 * x1 / z1 + c6 * x2 + c7 * x2 / z2 + c8 * x1**2 + c9 * x2**2
     dedendum = 0.5 * (pinion.dedendum + wheel.dedendum)
@@ -55,5 +54,5 @@ def _iso_stiffness(pair: GearPair, line_load: Scalar) -> IsoStiffness:
     first, second = pinion.material.elastic_modulus, wheel.material.elastic_modulus
     steel = 2 * first * second / (first + second) / 206_000.0
     light = jnp.minimum(line_load / _LIGHT_LOAD, 1.0) ** 0.25
-    single = _MODEL_FACTOR * rack * steel * light / q
+    single = _MODEL_FACTOR * rack * steel * light / q * pinion.helix_cosine
     return IsoStiffness(1 / q, single, single * (0.75 * path_of_contact(pair).contact_ratio + 0.25))

@@ -12,6 +12,11 @@ from ..numerics.reductions import Range as Range
 from ..numerics.reductions import Rms as Rms
 from ..numerics.reductions import Value as Value
 from .analysis import Analysis as Analysis
+from .contact_lines import axial_force as axial_force
+from .contact_lines import contact_line_lengths as contact_line_lengths
+from .contact_lines import shuttling_moment as shuttling_moment
+from .contact_lines import tilting_moments as tilting_moments
+from .contact_lines import total_contact_ratio as total_contact_ratio
 from .excitation import Harmonics as Harmonics
 from .excitation import excited_by as excited_by
 from .excitation import force_excitation as force_excitation
@@ -37,6 +42,7 @@ from .load_distribution import effective_contact_ratio as effective_contact_rati
 from .load_distribution import face_load_factor as face_load_factor
 from .load_distribution import face_load_factors as face_load_factors
 from .load_distribution import load_sharing as load_sharing
+from .load_distribution import mean_face_load_factor as mean_face_load_factor
 from .load_distribution import root_face_load_factor as root_face_load_factor
 from .lubricant import Lubricant as Lubricant
 from .lubrication import bulk_temperature as bulk_temperature

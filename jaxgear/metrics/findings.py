@@ -177,7 +177,8 @@ def findings_of(
         numbers.append(_finding("least backlash", "", pair.backlash_limits[0]))
     if rpm is not None:
         # from numbers, as a product of arrays compiles anew in every process
-        diameter = float(pair.pinion.module) * float(pair.pinion.teeth)
+        angle = 0.0 if pair.pinion.helix_angle is None else float(pair.pinion.helix_angle)
+        diameter = float(pair.pinion.module) * float(pair.pinion.teeth) / float(np.cos(np.deg2rad(angle)))
         velocity = float(rpm) * np.pi / 60 * diameter * 1e-3
         numbers.append(_finding("pitch line velocity", "", velocity))
     if coefficient is not None:

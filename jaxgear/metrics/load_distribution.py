@@ -15,7 +15,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..contact import MeshCycle
-from ..numerics import Checked, maximum, minimum, over_batch, program, result, safe_divide
+from ..numerics import Checked, maximum, minimum, over_batch, over_slices, program, result, safe_divide
 from ..shafts import face_load_factor as factor_of
 from ..shafts import tooth_height
 from ..shafts.face_load import root_exponent
@@ -27,8 +27,9 @@ class ContactShock(Checked):
     """Contact beyond the theoretical path of contact.
 
     Attributes:
-        approach: loaded path length before its start, where the wheel's tip corner touches.
-        recess: loaded path length after its end, where the pinion's tip corner touches.
+        approach: loaded path length before its start, where the wheel's tip corner touches; of helical gears in the
+            slice where it is longest.
+        recess: loaded path length after its end, where the pinion's tip corner touches, likewise.
         force: largest force on a pair beyond the theoretical path of contact [N].
     """
 
@@ -56,38 +57,50 @@ def effective_contact_ratio(cycle: MeshCycle) -> Scalar:
     the value changes continuously with the design. Above the theoretical contact ratio the teeth meet with their
     corners.
     """
-    return jnp.sum(jnp.mean(_loaded_fraction(cycle.opening), axis=-1))
+    return jnp.sum(jnp.mean(_loaded_fraction(minimum(cycle.opening, axis=1)), axis=-1))
 
 
 @over_batch
 def contact_shock(cycle: MeshCycle) -> ContactShock:
     """Loaded path beyond its theoretical ends and the largest corner force there."""
-    kinematics, fraction = cycle.kinematics, _loaded_fraction(cycle.opening)
-    contact, path = kinematics.path_of_contact, kinematics.path
+    kinematics = cycle.kinematics
+    contact, path = kinematics.path_of_contact, kinematics.contact_path
+    fraction = _loaded_fraction(cycle.opening if kinematics.helical else minimum(cycle.opening, axis=1))
     step = contact.base_pitch / kinematics.resolution.positions
     # Every step [path, path + step] counts with its loaded length minus the part of it that lies on the theoretical
     # path: contact is unbroken, so a step across an end of the path is loaded on the inside first.
     before = jnp.clip(contact.start - path, 0.0, step)
     after = jnp.clip(path + step - contact.end, 0.0, step)
-    return ContactShock(
-        jnp.sum(jnp.maximum(fraction * step - (step - before), 0.0)),
-        jnp.sum(jnp.maximum(fraction * step - (step - after), 0.0)),
-        maximum(corner_force(cycle)),
-    )
+    before, after = (jnp.maximum(fraction * step - (step - part), 0.0) for part in (before, after))
+    if kinematics.helical:  # over pairs and positions
+        approach, recess = (maximum(jnp.sum(part, axis=(0, 2))) for part in (before, after))
+    else:
+        approach, recess = jnp.sum(before), jnp.sum(after)
+    return ContactShock(approach, recess, maximum(corner_force(cycle)))
 
 
 def corner_force(cycle: MeshCycle) -> Float[Array, "pairs positions"]:
     """Force of every pair beyond the path of contact [N]."""
-    return jnp.where(cycle.kinematics.outside > 0, cycle.pair_force, 0.0)
+    outside = cycle.kinematics.contact_outside > 0
+    if cycle.kinematics.helical:
+        return jnp.sum(jnp.where(outside, slice_forces(cycle), 0.0), axis=1)
+    return jnp.where(outside, cycle.pair_force, 0.0)
+
+
+def slice_forces(cycle: MeshCycle) -> Float[Array, "pairs slices positions"]:
+    """What every slice has of `pair_force` [N], as the loads of the slices are."""
+    load = cycle.line_load * cycle.kinematics.slice_width[None, :, None]
+    return load * over_slices(safe_divide(cycle.pair_force, jnp.sum(load, axis=1)))
 
 
 @partial(jax.jit, inline=True)
-def _loaded_fraction(opening: Float[Array, "pairs slices positions"]) -> Float[Array, "pairs positions"]:
+def _loaded_fraction(opening: Float[Array, "pairs *slices positions"]) -> Float[Array, "pairs *slices positions"]:
     """Loaded part of every step from one position to the next, per pair."""
-    depth = -minimum(opening, axis=1)
+    depth = -opening
     # after the last position every pair takes the place of its predecessor
-    arriving = jnp.concatenate([depth[:1, :1] * 0 - jnp.abs(depth[:1, -1:]), depth[:-1, :1]])
-    following = jnp.concatenate([depth[:, 1:], arriving], axis=1)
+    first, last = depth[..., :1], depth[..., -1:]
+    arriving = jnp.concatenate([first[:1] * 0 - jnp.abs(last[:1]), first[:-1]])
+    following = jnp.concatenate([depth[..., 1:], arriving], axis=-1)
     rising = following > depth
     low, high = jnp.where(rising, depth, following), jnp.where(rising, following, depth)
     crossing = (high > 0) & (low <= 0)
@@ -99,32 +112,60 @@ Curve = Float[Array, " positions"]
 
 
 class _Face(NamedTuple):
-    """Line load over the face [N/mm], slices last, and the width of every slice [mm]."""
+    """Load over the face of one pair.
+
+    Attributes:
+        line_load: slices last [N/mm].
+        width: of every slice [mm].
+        share: of the face over which the contact line lies, all of it where the pair is unloaded.
+    """
 
     line_load: Float[Array, "... slices"]
     width: Float[Array, " slices"]
+    share: Float[Array, "..."]
+
+    @property
+    def factor(self) -> Float[Array, "..."]:
+        """Largest over mean line load."""
+        return factor_of(self.line_load, self.width) * self.share
 
 
 @over_batch
 def face_load_factors(cycle: MeshCycle) -> Curve:
-    """Of every position, largest over mean line load over the face of the pair with the largest line load there.
+    """Of every position, largest over mean line load over the face of the pair with the largest line load there; of
+    helical gears of the pair with the largest force, over the part of the face where its contact line lies.
 
     Raises:
         ValueError: for a cycle of one slice.
     """
-    return factor_of(*_at_positions("face_load_factors", cycle))
+    return _at_positions("face_load_factors", cycle).factor
 
 
 @over_batch
 def face_load_factor(cycle: MeshCycle) -> Scalar:
     """K_Hbeta: largest over mean line load over the face, of the pair and at the position with the largest line load.
 
+    Of helical gears, where lines that enter at a corner of the flank carry a peak on little of the face, it is that of
+    the pairs with the largest force of every position, over the part of the face where the contact line lies.
+
     Differentiable where that pair and position stay the same.
 
     Raises:
         ValueError: for a cycle of one slice.
     """
-    return factor_of(*_worst("face_load_factor", cycle))
+    return _worst("face_load_factor", cycle).factor
+
+
+@over_batch
+def mean_face_load_factor(cycle: MeshCycle) -> Scalar:
+    """Largest over mean load over the face, of all pairs together and of the mean over the cycle: what a model with one
+    stiffness over the face calls K_Hbeta (ISO 6336-1, Annex E).
+
+    Raises:
+        ValueError: for a cycle of one slice.
+    """
+    _check_slices("mean_face_load_factor", cycle)
+    return factor_of(jnp.mean(jnp.sum(cycle.line_load, axis=0), axis=1), cycle.kinematics.slice_width)
 
 
 @over_batch
@@ -135,7 +176,7 @@ def root_face_load_factor(cycle: MeshCycle) -> Scalar:
         ValueError: for a cycle of one slice.
     """
     pair = cycle.kinematics.pair
-    factor = factor_of(*_worst("root_face_load_factor", cycle))
+    factor = _worst("root_face_load_factor", cycle).factor
     return jnp.maximum(factor, 1.0) ** root_exponent(pair.face_width, tooth_height(pair))
 
 
@@ -153,7 +194,7 @@ def edge_load_factor(cycle: MeshCycle) -> Scalar:
     mean = jnp.sum(face.line_load * face.width) / jnp.sum(face.width)
     idle = mean <= 0
     ends = jnp.maximum(face.line_load[0], face.line_load[-1])
-    return jnp.where(idle, 1.0, ends / jnp.where(idle, 1.0, mean))
+    return jnp.where(idle, 1.0, ends / jnp.where(idle, 1.0, mean)) * face.share
 
 
 def over_several_slices(factor: Callable[[MeshCycle], Scalar], cycle: MeshCycle) -> Scalar | float:
@@ -162,16 +203,29 @@ def over_several_slices(factor: Callable[[MeshCycle], Scalar], cycle: MeshCycle)
 
 
 def _at_positions(owner: str, cycle: MeshCycle) -> _Face:
-    """Of every position, the pair with the largest line load; shape (positions, slices)."""
-    slices = cycle.kinematics.resolution.slices
-    if slices == 1:
+    """Of every position, the pair with the largest line load, of helical gears with the largest force; shape
+    (positions, slices).
+    """
+    _check_slices(owner, cycle)
+    of, load = cycle.kinematics, jnp.moveaxis(cycle.line_load, 2, 0)  # positions, pairs, slices
+    size = load @ of.slice_width if of.helical else jnp.max(load, axis=2)
+    most = jnp.argmax(size, axis=1)[:, None, None]
+    found = _Face(jnp.take_along_axis(load, most, axis=1)[:, 0], of.slice_width, jnp.ones_like(load[:, 0, 0]))
+    if not of.helical:
+        return found
+    touching = jnp.moveaxis((of.contact_outside <= 0) | (cycle.line_load > 0), 2, 0)
+    touching = jnp.take_along_axis(touching, most, axis=1)[:, 0]
+    share = touching.astype(load.dtype) @ of.slice_width / jnp.sum(of.slice_width)
+    return found._replace(share=jnp.where(jnp.max(found.line_load, axis=1) > 0, share, 1.0))
+
+
+def _check_slices(owner: str, cycle: MeshCycle) -> None:
+    if cycle.kinematics.resolution.slices == 1:
         raise ValueError(f"{owner}: a mesh of 1 slice has no load over the face: prepare with Resolution(slices=11)")
-    load = jnp.moveaxis(cycle.line_load, 2, 0)  # positions, pairs, slices
-    most = jnp.argmax(jnp.max(load, axis=2), axis=1)
-    return _Face(jnp.take_along_axis(load, most[:, None, None], axis=1)[:, 0], cycle.kinematics.slice_width)
 
 
 def _worst(owner: str, cycle: MeshCycle) -> _Face:
-    """The pair and position with the largest line load; shape (slices,)."""
+    """Of these, that of the position with the largest line load; shape (slices,)."""
     found = _at_positions(owner, cycle)
-    return found._replace(line_load=found.line_load[jnp.argmax(jnp.max(found.line_load, axis=1))])
+    worst = jnp.argmax(jnp.max(found.line_load, axis=1))
+    return found._replace(line_load=found.line_load[worst], share=found.share[worst])

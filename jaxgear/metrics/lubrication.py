@@ -2,6 +2,10 @@
 
 Loads, pressures and sliding are those of the cycle; what the standards work out at a few points of the path of contact
 with shares of the load and factors for its distribution, stands here at every contact point.
+
+Of helical gears every slice is at its own place on the transverse path of contact. Flanks slide over each other in the
+transverse section, across the contact line; radii of curvature are those of the section normal to that line, rho /
+cos(beta_b), and line loads are per length of it.
 """
 
 import jax.numpy as jnp
@@ -9,8 +13,9 @@ from jaxtyping import Array, Float
 
 from ..compliance.plane import combined_modulus
 from ..contact import MeshCycle
-from ..geometry import GearPair, check_spur, path_of_contact, reduced_radius
-from ..numerics import Given, check, over_batch, real, safe_divide, safe_power, safe_sqrt
+from ..geometry import GearPair, path_of_contact, reduced_radius
+from ..numerics import Given, check, over_batch, over_slices, real, safe_divide, safe_power, safe_sqrt
+from .load_distribution import slice_forces
 from .lubricant import Lubricant
 
 Load = Float[Array, "pairs slices positions"]
@@ -48,17 +53,22 @@ def flash_temperature(
 def _flash(cycle: MeshCycle, speed, friction) -> Load:
     kinematics, (pinion, wheel) = cycle.kinematics, cycle.sides
     pair = kinematics.pair
-    pinion_speed, wheel_speed = kinematics.path_of_contact.rolling_speeds(kinematics.path, speed)
-    reduced = reduced_radius(pinion.contact_roll_length, wheel.contact_roll_length)
+    pinion_speed, wheel_speed = kinematics.path_of_contact.rolling_speeds(kinematics.contact_path, speed)
+    reduced = over_slices(_normal(pair, reduced_radius(pinion.contact_roll_length, wheel.contact_roll_length)))
     modulus = combined_modulus(pair.pinion.material, pair.wheel.material, kinematics.plane)
-    half_width = safe_sqrt(4 * cycle.line_load * reduced[:, None] / modulus / jnp.pi) * 1e-3  # [m]
-    heat = friction * cycle.line_load * 1e3 * jnp.abs(pinion_speed - wheel_speed)[:, None]
+    half_width = safe_sqrt(4 * cycle.line_load * reduced / modulus / jnp.pi) * 1e-3  # [m]
+    heat = friction * cycle.line_load * 1e3 * over_slices(jnp.abs(pinion_speed - wheel_speed))
     sink = pair.pinion.material.thermal_contact_coefficient * safe_sqrt(
         pinion_speed
     ) + pair.wheel.material.thermal_contact_coefficient * safe_sqrt(wheel_speed)
     # no heat makes no rise, also where it is not conducted; heat that is not finite stays so
-    rise = _BLOK_FACTOR * safe_divide(heat, sink[:, None] * safe_sqrt(2 * half_width), default=0.0 * heat)
-    return jnp.where((kinematics.outside <= 0)[:, None], rise, 0.0)
+    rise = _BLOK_FACTOR * safe_divide(heat, over_slices(sink) * safe_sqrt(2 * half_width), default=0.0 * heat)
+    return jnp.where(over_slices(kinematics.contact_outside <= 0), rise, 0.0)
+
+
+def _normal(pair: GearPair, radius: Float[Array, "..."]) -> Float[Array, "..."]:
+    """A relative radius of curvature of the transverse section [mm], in the section normal to the contact line."""
+    return radius / jnp.cos(pair.pinion.base_helix_angle)
 
 
 Scalar = Float[Array, ""]
@@ -68,35 +78,39 @@ Scalar = Float[Array, ""]
 def loss_factor(cycle: MeshCycle) -> Scalar:
     """Loss factor H_VL of the loaded mesh: loss power = input power * friction coefficient * H_VL.
 
-        H_VL = 1 / (p_et b) int int (f_N b / F_bt) (v_g / v_tb) dx dy
+        H_VL = 1 / (p_et b cos(beta_b)) int int (f_N b / F_bt) (v_g / v_tb) dx dy
 
     with the line load f_N of this cycle, the sliding speed v_g and the speed of the base circles v_tb. Corner contact
-    counts with the sliding speed at its path position. Zero at zero torque.
+    counts with the sliding speed at its path position. Of helical gears the friction is that of the normal force,
+    F_bt / cos(beta_b). Zero at zero torque.
 
     References:
         A. Wimmer, Lastverluste von Stirnradverzahnungen, TU Muenchen 2006.
     """
-    contact = cycle.kinematics.path_of_contact
+    kinematics = cycle.kinematics
+    contact = kinematics.path_of_contact
     # sliding over base-circle speed: v_g / v_tb = |s| (1 / r_b1 + 1 / r_b2)
-    sliding = jnp.abs(cycle.kinematics.path) * (1 / contact.pinion_base_radius + 1 / contact.wheel_base_radius)
-    return safe_divide(jnp.sum(jnp.mean(cycle.pair_force * sliding, axis=-1)), cycle.force)
+    sliding = jnp.abs(kinematics.contact_path) * (1 / contact.pinion_base_radius + 1 / contact.wheel_base_radius)
+    force = cycle.pair_force
+    if kinematics.helical:
+        force = slice_forces(cycle) / jnp.cos(kinematics.pair.pinion.base_helix_angle)
+    return safe_divide(jnp.sum(jnp.mean(force * sliding, axis=-1)), cycle.force)
 
 
 def ohlendorf_loss_factor(pair: GearPair) -> Scalar:
     """Loss factor H_v of the geometry alone, for contact ratios from 1 to 2.
 
-        H_v = pi (u + 1) / (z1 u) (1 - eps + eps1^2 + eps2^2)
+        H_v = pi (u + 1) / (z1 u cos(beta_b)) (1 - eps + eps1^2 + eps2^2)
 
     References:
         H. Ohlendorf, Verlustleistung und Erwaermung von Stirnraedern, TH Muenchen 1958; G. Niemann, H. Winter,
         Maschinenelemente II.
     """
-    check_spur("ohlendorf_loss_factor", *pair.gears)
     path = path_of_contact(pair)
     recess, approach = path.end / path.base_pitch, -path.start / path.base_pitch
     ratio = pair.gear_ratio
     share = 1 - (recess + approach) + recess**2 + approach**2
-    return jnp.pi * (ratio + 1) / (pair.pinion.teeth * ratio) * share
+    return jnp.pi * (ratio + 1) / (pair.pinion.teeth * ratio) * share / jnp.cos(pair.pinion.base_helix_angle)
 
 
 # leading constants of the laws of friction
@@ -115,8 +129,8 @@ def friction_coefficient(cycle: MeshCycle, lubricant: Lubricant) -> Scalar:
 
         mu = c (w / (v rho))^0.2 eta^-0.05 X_R X_L
 
-    with the line load w = F_bt / b [N/mm], the sum of both rolling speeds v [m/s] and the reduced radius rho [mm] at
-    the pitch point, and the viscosity eta [mPa s] at the temperature of the oil. By `lubricant.friction`,
+    with the line load w = F_bt / b [N/mm], the sum of both rolling speeds v [m/s] and the normal relative radius rho
+    [mm] at the pitch point, and the viscosity eta [mPa s] at the temperature of the oil. By `lubricant.friction`,
 
         "schlenk"      c = 0.048, X_R = Ra^0.25
         "iso_6336_20"  c = 0.060, X_R = Ra^0.25
@@ -131,13 +145,12 @@ def friction_coefficient(cycle: MeshCycle, lubricant: Lubricant) -> Scalar:
         L. Schlenk, Untersuchungen zur Fresstragfaehigkeit von Grosszahnraedern, TU Muenchen 1994; ISO/TR 13989-1
         (ISO/TS 6336-20); ISO/TR 15144-1 (ISO/TS 6336-22).
     """
-    check_spur("friction_coefficient", *cycle.kinematics.pair.gears)
     if cycle.operating_point.friction is not None:
         return cycle.operating_point.friction
     speed = _running("friction_coefficient", cycle)
     check("friction_coefficient", "speed", speed, "rpm", low=0.0, open_low=True)
     contact = cycle.kinematics.path_of_contact
-    radius = contact.reduced_radius(0.0)
+    radius = _normal(cycle.kinematics.pair, contact.reduced_radius(0.0))
     rolling = sum(contact.rolling_speeds(0.0, speed))
     line_load = cycle.force / cycle.kinematics.pair.face_width
     viscosity = 1e3 * lubricant.viscosity(lubricant.temperature)
@@ -211,19 +224,18 @@ def film_thickness(cycle: MeshCycle, lubricant: Lubricant) -> Load:
         h = 1600 rho G^0.6 U^0.7 W^-0.13 S^0.22,      E_r = 2 E*
         G = alpha E_r,  U = eta v / (2 E_r rho),  W = 2 pi p^2 / E_r^2,  S = (alpha eta at the contact) / (alpha eta)
 
-    with the reduced radius rho [mm] of the involutes, the sum v of the rolling speeds, the pressure p of the cycle;
-    viscosity eta and its pressure coefficient alpha at the bulk temperature, in S also at the contact temperature.
-    Where the contact is hotter than any oil (510 degC) there is no film.
+    with the normal relative radius rho [mm] of the involutes, the sum v of the rolling speeds, the pressure p of the
+    cycle; viscosity eta and its pressure coefficient alpha at the bulk temperature, in S also at the contact
+    temperature. Where the contact is hotter than any oil (510 degC) there is no film.
 
     References:
         D. Dowson, G. R. Higginson, Elasto-hydrodynamic Lubrication, 1966; ISO/TS 6336-22 (ISO/TR 15144-1), method A.
     """
     kinematics, (pinion, wheel) = cycle.kinematics, cycle.sides
     speed = _running("film_thickness", cycle)
-    speeds = kinematics.path_of_contact.rolling_speeds(kinematics.path, speed)
-    rolling = (speeds[0] + speeds[1])[:, None]
-    radius = reduced_radius(pinion.contact_roll_length, wheel.contact_roll_length)[:, None]
-    pair = kinematics.pair
+    speeds = kinematics.path_of_contact.rolling_speeds(kinematics.contact_path, speed)
+    rolling, pair = over_slices(speeds[0] + speeds[1]), kinematics.pair
+    radius = over_slices(_normal(pair, reduced_radius(pinion.contact_roll_length, wheel.contact_roll_length)))
     modulus = 2e6 * combined_modulus(pair.pinion.material, pair.wheel.material, kinematics.plane)  # E_r [Pa]
     bulk, hot = bulk_temperature(cycle, lubricant), contact_temperature(cycle, lubricant)
     viscosity, coefficient = lubricant.viscosity(bulk), lubricant.pressure_viscosity(bulk)

@@ -11,6 +11,7 @@ from ..contact import MeshCycle
 from ..geometry import margins
 from ..numerics import over_batch
 from ..numerics.reductions import Average, Harmonic, Max, Min, Range, Rms
+from .contact_lines import axial_force, contact_line_lengths, shuttling_moment, tilting_moments, total_contact_ratio
 from .excitation import force_excitation, relative_transmission_error
 from .flank import max_relief, relief_reversal, removed_volume
 from .load_distribution import (
@@ -19,6 +20,7 @@ from .load_distribution import (
     edge_load_factor,
     effective_contact_ratio,
     face_load_factor,
+    mean_face_load_factor,
     root_face_load_factor,
 )
 from .lubrication import loss_factor
@@ -49,12 +51,19 @@ def mean_removed_material(cycle: MeshCycle) -> Scalar:
 
     It breaks ties among designs of equal transmission error: what is not removed need not be ground.
     """
-    inside = cycle.kinematics.outside <= 0
+    inside = cycle.kinematics.contact_outside <= 0
     # on the path of contact unmodified flanks have no gap: what is there is the modification
     width = cycle.kinematics.slice_width
+    if cycle.kinematics.helical:
+        weight = jnp.where(inside, width[None, :, None], 0.0)
+        return jnp.sum(cycle.gap * weight) / jnp.sum(weight)
     over_face = jnp.einsum("psn,s->pn", cycle.gap, width) / jnp.sum(width)
     removed = jnp.where(inside, over_face, 0.0)
     return jnp.sum(removed) / jnp.sum(inside.astype(removed.dtype))
+
+
+def _of_pair(of: Any):
+    return lambda cycle: of(cycle.kinematics.pair)
 
 
 def _margin(name: str):
@@ -148,12 +157,25 @@ MESH_QUANTITIES = Vocabulary(
             Max(),
             local=True,
         ),
-        Quantity("max_line_load", lambda c: c.line_load, "N/mm", "largest line load", Max(), local=True),
+        Quantity(
+            "max_line_load",
+            lambda c: c.line_load,
+            "N/mm",
+            "largest line load: normal force per length of the contact line",
+            Max(),
+            local=True,
+        ),
         Quantity(
             "face_load_factor",
             face_load_factor,
             meaning="K_Hbeta, largest over mean line load over the face",
             label="face load factor K_Hbeta",
+            form=".3f",
+        ),
+        Quantity(
+            "mean_face_load_factor",
+            mean_face_load_factor,
+            meaning="largest over mean load over the face of all pairs together, mean over the cycle",
             form=".3f",
         ),
         Quantity("root_face_load_factor", root_face_load_factor, meaning="K_Fbeta, face load factor for root stress"),
@@ -170,6 +192,61 @@ MESH_QUANTITIES = Vocabulary(
             effective_contact_ratio,
             meaning="mean number of loaded pairs",
             better="larger",
+            form=".3f",
+        ),
+        Quantity(
+            "overlap_ratio",
+            _of_pair(lambda pair: pair.overlap_ratio),
+            meaning="face width in axial pitches, 0 of spur gears",
+            better="larger",
+            form=".3f",
+        ),
+        Quantity(
+            "total_contact_ratio",
+            total_contact_ratio,
+            meaning="transverse contact ratio plus overlap ratio",
+            better="larger",
+            form=".3f",
+        ),
+        *(
+            Quantity(
+                f"{name}_contact_line_length",
+                _of_pair(lambda pair, end=end: contact_line_lengths(pair)[end]),
+                "mm",
+                f"{name} length of the contact lines of all pairs together over the cycle, theoretical",
+                better="larger",
+                form=".2f",
+            )
+            for end, name in enumerate(("least", "mean"))
+        ),
+        Quantity("axial_force", axial_force, "N", "axial force of the mesh, 0 of spur gears", form=".1f"),
+        *(
+            Quantity(
+                f"{gear}_tilting_moment",
+                lambda cycle, number=number: tilting_moments(cycle)[number],
+                "N m",
+                f"axial force times working pitch radius, {gear}",
+                form=".3f",
+            )
+            for number, gear in enumerate(("pinion", "wheel"))
+        ),
+        Quantity(
+            "shuttling_moment",
+            shuttling_moment,
+            "N m",
+            "peak to peak of the moment of the mesh force about the middle of the face, excites bearings",
+            Range(),
+            local=True,
+            label="shuttling moment, peak to peak",
+            form=".3f",
+        ),
+        Quantity(
+            "mean_shuttling_moment",
+            shuttling_moment,
+            "N m",
+            "mean moment of the mesh force about the middle of the face",
+            Average(),
+            local=True,
             form=".3f",
         ),
         Quantity("corner_contact_length", _corner_length, "mm", "loaded path beyond the theoretical path of contact"),
@@ -277,6 +354,15 @@ _SUMMARY = (
     "force_excitation",
 )
 
+_OBLIQUE = (  # of helical gears
+    "overlap_ratio",
+    "total_contact_ratio",
+    "least_contact_line_length",
+    "axial_force",
+    "pinion_tilting_moment",
+    "wheel_tilting_moment",
+    "shuttling_moment",
+)
 _OVER_FACE = ("face_load_factor", "root_face_load_factor", "edge_load_factor")  # of several slices
 
 
@@ -284,6 +370,7 @@ _OVER_FACE = ("face_load_factor", "root_face_load_factor", "edge_load_factor")  
 def summary(cycle: MeshCycle) -> dict[str, Float[Array, ""]]:
     """The numbers that engineers ask for first, by name and unit; traceable, so it can be vmapped."""
     names = _SUMMARY if cycle.kinematics.resolution.slices == 1 else (*_SUMMARY, *_OVER_FACE)
+    names = (*names, *_OBLIQUE) if cycle.kinematics.helical else names
     return {
         "torque_Nm": cycle.torque,
         **{MESH_QUANTITIES[name].key: MESH_QUANTITIES[name](cycle) for name in names},

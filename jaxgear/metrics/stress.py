@@ -10,7 +10,8 @@ degree tangent) is the same, and the lever arm follows the contact along the fla
 
 References:
     ISO 6336-3:2006 clause 6, with the sign of the last term of h_Fe as in the 2019 edition (the 2006 print drops a
-    minus).
+    minus); of helical gears with its factor Y_beta. The edition of 2019 divides that by cos(beta)^3 and multiplies the
+    form factor by a share of the load f_eps. ISO 6336-2:2006 with Z_beta of its corrigendum of 2008.
 """
 
 from typing import NamedTuple
@@ -21,10 +22,11 @@ from jaxtyping import Array, Float
 
 from ..compliance.plane import combined_modulus
 from ..contact import MeshCycle, Side
-from ..geometry import Gear, GearPair, check_spur, path_of_contact
+from ..geometry import Gear, GearPair, path_of_contact
+from ..geometry.gear import virtual_gear
 from ..geometry.involute import load_angle
 from ..geometry.outline import rack_tip
-from ..numerics import Checked, over_batch, result, safe_sqrt
+from ..numerics import Checked, over_batch, over_slices, result, safe_sqrt
 from .load_distribution import face_load_factor, over_several_slices, root_face_load_factor
 
 Scalar = Float[Array, ""]
@@ -41,11 +43,14 @@ class ContactStress(Checked):
 def nominal_contact_stress(cycle: MeshCycle) -> ContactStress:
     """sigma_H = Z sigma_H0 sqrt(K_Hbeta) of both gears [MPa], for contact ratios from 1 to 2.
 
-        sigma_H0 = Z_H Z_E Z_eps sqrt(F_t / (d_1 b) (u + 1) / u),      Z_eps = sqrt((4 - eps) / 3)
+        sigma_H0 = Z_H Z_E Z_eps Z_beta sqrt(F_t / (d_1 b) (u + 1) / u)
+        Z_eps = sqrt((4 - eps_alpha) / 3 (1 - eps_beta) + eps_beta / eps_alpha), eps_beta at most 1
+        Z_beta = 1 / sqrt(cos(beta))
 
-    which is Z_eps times Hertz's pressure of one pair at the pitch point, in plane strain. Z is Z_B of the pinion and
-    Z_D of the wheel: from the pitch point to the inner and outer point of single contact, where that is the worse
-    place. K_Hbeta is `face_load_factor`, 1 on one slice. Factors of application and dynamics belong into the torque.
+    which of spur gears is Z_eps times Hertz's pressure of one pair at the pitch point, in plane strain. Z is Z_B of the
+    pinion and Z_D of the wheel: from the pitch point to the inner and outer point of single contact, where that is the
+    worse place; between spur gears and an overlap ratio of 1, where it is 1, linear in the overlap ratio. K_Hbeta is
+    `face_load_factor`, 1 on one slice. Factors of application and dynamics belong into the torque.
 
     References:
         ISO 6336-2, clauses 6 and 7 (nominal contact stress, zone factor, single pair contact factors).
@@ -58,40 +63,48 @@ def nominal_contact_stress(cycle: MeshCycle) -> ContactStress:
 def nominal_stress_squares(pair: GearPair) -> tuple[Scalar, Scalar]:
     """Squares of `nominal_contact_stress` per line load along the line of action, pinion and wheel [MPa^2 mm/N]."""
     factors = contact_factor_squares(pair)
-    at_pitch = factors.contact_ratio * factors.elasticity / path_of_contact(pair).reduced_radius(jnp.zeros(()))
+    normal = factors.contact_ratio * factors.elasticity * factors.helix_angle * jnp.cos(pair.pinion.base_helix_angle)
+    at_pitch = normal / path_of_contact(pair).reduced_radius(jnp.zeros(()))
     return at_pitch * factors.pinion_single_pair, at_pitch * factors.wheel_single_pair
 
 
 class ContactFactors(NamedTuple):
-    """Squares of factors of ISO 6336-2 for spur gears.
+    """Squares of factors of ISO 6336-2.
 
     Attributes:
         zone: Z_H^2.
         elasticity: Z_E^2 [MPa].
         contact_ratio: Z_eps^2.
+        helix_angle: Z_beta^2.
         pinion_single_pair, wheel_single_pair: Z_B^2 and Z_D^2, at least 1.
     """
 
     zone: Scalar
     elasticity: Scalar
     contact_ratio: Scalar
+    helix_angle: Scalar
     pinion_single_pair: Scalar
     wheel_single_pair: Scalar
 
 
 def contact_factor_squares(pair: GearPair) -> ContactFactors:
     """The factors of `nominal_contact_stress` that belong to a pair, whatever its load."""
-    check_spur("nominal_contact_stress", *pair.gears)
     contact = path_of_contact(pair)
+    overlap = jnp.minimum(pair.overlap_ratio, 1.0)
     pitch = contact.reduced_radius(jnp.zeros(()))
     inner, outer = (pitch / contact.reduced_radius(single) for single in (contact.inner_single, contact.outer_single))
-    cosine = jnp.cos(jnp.deg2rad(pair.pinion.pressure_angle))
+    inner, outer = (jnp.maximum(single, 1.0) for single in (inner, outer))
+    if pair.pinion.helix_angle is not None:
+        inner, outer = ((1 + (1 - overlap) * (jnp.sqrt(square) - 1)) ** 2 for square in (inner, outer))
+    cosine = jnp.cos(pair.pinion.transverse_pressure_angle)
+    sharing = jnp.maximum(4 - contact.contact_ratio, 0.0) / 3
     return ContactFactors(
-        zone=2 / (cosine**2 * jnp.tan(pair.working_pressure_angle)),
+        zone=2 * jnp.cos(pair.pinion.base_helix_angle) / (cosine**2 * jnp.tan(pair.working_pressure_angle)),
         elasticity=combined_modulus(pair.pinion.material, pair.wheel.material, "strain") / jnp.pi,
-        contact_ratio=jnp.maximum(4 - contact.contact_ratio, 0.0) / 3,
-        pinion_single_pair=jnp.maximum(inner, 1.0),
-        wheel_single_pair=jnp.maximum(outer, 1.0),
+        contact_ratio=sharing * (1 - overlap) + overlap / contact.contact_ratio,
+        helix_angle=1 / pair.pinion.helix_cosine,
+        pinion_single_pair=inner,
+        wheel_single_pair=outer,
     )
 
 
@@ -100,6 +113,7 @@ Load = Float[Array, "pairs slices positions"]
 
 _SECTION_STEPS = 8  # fixed-point steps of ISO 6336-3 for theta; it gains two digits per step
 _NOTCH_LIMITS = (1.0, 8.0)  # validity of Y_S in the notch parameter q_s
+_OBLIQUE, _MOST_OBLIQUE = 120.0, 30.0  # deg; Y_beta = 1 - eps_beta beta / 120 deg, beta at most 30 deg
 # Contacts near the root load the section with hardly any lever arm; the formula needs a positive one [x module].
 _SHORTEST_ARM = 0.05
 
@@ -141,8 +155,8 @@ class NominalRootStress(Checked):
 
 
 def critical_section(gear: Gear) -> CriticalSection:
-    """Section of the generated root at the 30 degree tangent (external spur gear)."""
-    check_spur("root_stress", gear)
+    """Section of the generated root at the 30 degree tangent; of helical gears that of the normal section."""
+    gear = _of_normal_section(gear)
     m, z = gear.module, gear.teeth
     offset, below, radius = (length / m for length in rack_tip(gear))
     g, h = -below, 2 / z * offset - jnp.pi / 3
@@ -154,8 +168,19 @@ def critical_section(gear: Gear) -> CriticalSection:
     return CriticalSection(chord * m, fillet * m, depth * m)
 
 
+def _of_normal_section(gear: Gear) -> Gear:
+    return gear if gear.helix_angle is None else virtual_gear(gear)
+
+
 def root_factors(gear: Gear, roll_length: Real) -> RootFactors:
-    """Y_F and Y_S for a load at a roll length [mm] of the flank."""
+    """Y_F and Y_S for a load at a roll length [mm] of the flank.
+
+    Of helical gears they are those of the virtual spur gear, loaded at the same height of its tooth.
+    """
+    if gear.helix_angle is not None:
+        virtual = virtual_gear(gear)
+        radius = jnp.hypot(gear.base_radius, roll_length) - gear.pitch_radius + virtual.pitch_radius
+        gear, roll_length = virtual, safe_sqrt(radius**2 - virtual.base_radius**2)
     section, m = critical_section(gear), gear.module
     cosine = jnp.cos(load_angle(gear, roll_length))
     # the lever arm ends where the load line crosses the tooth centreline
@@ -169,22 +194,50 @@ def root_factors(gear: Gear, roll_length: Real) -> RootFactors:
 
 
 def root_stress_per_load(gear: Gear, roll_length: Real) -> Real:
-    """cos(alpha) / m Y_F Y_S: root stress by a line load along the line of action at a roll length [MPa mm/N]."""
-    factors = root_factors(gear, roll_length)
-    return factors.form * factors.correction * jnp.cos(jnp.deg2rad(gear.pressure_angle)) / gear.module
+    """cos(alpha_t) / m_n Y_F Y_S: root stress by a line load on the line of action at a roll length [MPa mm/N]."""
+    return _per_load(gear, root_factors(gear, roll_length))
+
+
+def _per_load(gear: Gear, factors: RootFactors) -> Real:
+    return factors.form * factors.correction * jnp.cos(gear.transverse_pressure_angle) / gear.module
+
+
+def single_contact_factors(pair: GearPair) -> tuple[RootFactors, RootFactors]:
+    """Y_F and Y_S of pinion and wheel at their outer points of single contact, for contact ratios to 2.
+
+    Of helical gears that point is the one of the virtual gears, whose contact ratio is eps_alpha / cos(beta_b)^2.
+    """
+    path = path_of_contact(pair)
+    if pair.pinion.helix_angle is None:
+        gears = pair.gears
+        rolls = path.pinion_roll_length(path.outer_single), path.wheel_roll_length(path.inner_single)
+    else:
+        gears = virtual_gear(pair.pinion), virtual_gear(pair.wheel)
+        double = path.contact_ratio / jnp.cos(pair.pinion.base_helix_angle) ** 2 - 1
+        one, other = (gear.tip_roll_length - double * gear.base_pitch for gear in gears)
+        rolls = one, other
+    pinion, wheel = (root_factors(gear, roll) for gear, roll in zip(gears, rolls))
+    return pinion, wheel
+
+
+def root_helix_factor(pair: GearPair) -> Scalar:
+    """Y_beta = 1 - eps_beta beta / 120 deg, eps_beta at most 1 and beta at most 30 deg (ISO 6336-3)."""
+    if pair.pinion.helix_angle is None:
+        return jnp.ones_like(pair.pinion.module)
+    angle = jnp.minimum(jnp.abs(pair.pinion.helix_angle), _MOST_OBLIQUE)
+    return 1 - jnp.minimum(pair.overlap_ratio, 1.0) * angle / _OBLIQUE
 
 
 def single_contact_root_stress(pair: GearPair) -> tuple[Scalar, Scalar]:
-    """`root_stress_per_load` of pinion and wheel at their outer points of single contact, for contact ratios to 2."""
-    path = path_of_contact(pair)
-    rolls = path.pinion_roll_length(path.outer_single), path.wheel_roll_length(path.inner_single)
-    pinion, wheel = (root_stress_per_load(gear, roll) for gear, roll in zip(pair.gears, rolls))
+    """cos(alpha_t) / m_n Y_F Y_S Y_beta of pinion and wheel [MPa mm/N] at their outer points of single contact."""
+    helix = root_helix_factor(pair)
+    pinion, wheel = (_per_load(*each) * helix for each in zip(pair.gears, single_contact_factors(pair)))
     return pinion, wheel
 
 
 @over_batch
 def nominal_root_stress(cycle: MeshCycle) -> NominalRootStress:
-    """sigma_F = F_t / (b m) Y_F Y_S K_Fbeta of both gears [MPa], for contact ratios from 1 to 2.
+    """sigma_F = F_t / (b m_n) Y_F Y_S Y_beta K_Fbeta of both gears [MPa], for contact ratios from 1 to 2.
 
     The whole load is at the outer point of single contact, whatever the contact analysis says of its sharing.
     K_Fbeta is `root_face_load_factor`, 1 on one slice. Factors of application and dynamics belong into the torque.
@@ -196,10 +249,14 @@ def nominal_root_stress(cycle: MeshCycle) -> NominalRootStress:
 
 @over_batch
 def root_stress(cycle: MeshCycle) -> RootStress:
-    """Local root stress f_t / m Y_F Y_S of both gears at every contact [MPa], f_t tangential line load there."""
+    """Local root stress f_t / m_n Y_F Y_S of both gears at every contact [MPa], f_t tangential line load there.
+
+    Every slice bends by its own load, at its own height where contact lines are oblique. What its neighbours, which are
+    loaded lower down, take over of its bending is not in it: that is Y_beta of the nominal stress.
+    """
 
     def stress(side: Side) -> Load:
-        return cycle.line_load * root_stress_per_load(side.gear, side.contact_roll_length)[:, None]
+        return cycle.line_load * over_slices(root_stress_per_load(side.gear, side.contact_roll_length))
 
     return RootStress(*(stress(side) for side in cycle.sides))
 
@@ -208,23 +265,25 @@ def root_stress(cycle: MeshCycle) -> RootStress:
 def rating_factors(cycle: MeshCycle) -> dict[str, Float[Array, ""]]:
     """Loads, factors and stresses of both gears, by name and unit; of contact ratios from 1 to 2.
 
-        sigma_H0 = Z_H Z_E Z_eps sqrt(F_t / (d_1 b) (u + 1) / u)     sigma_H = Z_B sigma_H0 sqrt(K_Hbeta), wheel: Z_D
-        sigma_F0 = F_t / (b m) Y_F Y_S                               sigma_F = sigma_F0 K_Fbeta
+        sigma_H0 = Z_H Z_E Z_eps Z_beta sqrt(F_t / (d_1 b) (u + 1) / u)
+        sigma_H = Z_B sigma_H0 sqrt(K_Hbeta), wheel: Z_D
+        sigma_F0 = F_t / (b m_n) Y_F Y_S Y_beta,  sigma_F = sigma_F0 K_Fbeta
 
     The stresses are those of `nominal_contact_stress` and `nominal_root_stress`.
 
     References:
         ISO 6336-2 clauses 6 and 7, ISO 6336-3 clauses 5 to 7 (Method B).
     """
-    pair, path = cycle.kinematics.pair, path_of_contact(cycle.kinematics.pair)
-    module, cosine = pair.pinion.module, jnp.cos(jnp.deg2rad(pair.pinion.pressure_angle))
+    pair = cycle.kinematics.pair
+    module, cosine = pair.pinion.module, jnp.cos(pair.pinion.transverse_pressure_angle)
     squares = contact_factor_squares(pair)
     one = jnp.ones_like(module)
     face, root_face = (one * over_several_slices(of, cycle) for of in (face_load_factor, root_face_load_factor))
-    zone, elasticity, sharing, *single = map(safe_sqrt, squares)
+    zone, elasticity, sharing, helix, *single = map(safe_sqrt, squares)
     tangential = cycle.force * cosine
     per_area = tangential / (2 * pair.pinion.pitch_radius * pair.face_width)
-    pitting = zone * elasticity * sharing * safe_sqrt(per_area * (1 + 1 / pair.gear_ratio))
+    pitting = zone * elasticity * sharing * helix * safe_sqrt(per_area * (1 + 1 / pair.gear_ratio))
+    root_helix = root_helix_factor(pair)
     found = {
         "tangential_force_N": tangential,
         "face_load_factor": face,
@@ -232,15 +291,15 @@ def rating_factors(cycle: MeshCycle) -> dict[str, Float[Array, ""]]:
         "zone_factor": zone,
         "elasticity_factor_sqrt_MPa": elasticity,
         "contact_ratio_factor": sharing,
+        "helix_angle_factor": helix,
         "nominal_contact_stress_MPa": pitting,
+        "root_helix_angle_factor": root_helix,
     }
     for name, factor in zip(("pinion", "wheel"), single):
         found[f"{name}_single_pair_contact_factor"] = factor
         found[f"{name}_contact_stress_MPa"] = pitting * factor * safe_sqrt(face)
-    rolls = path.pinion_roll_length(path.outer_single), path.wheel_roll_length(path.inner_single)
-    for name, gear, roll in zip(("pinion", "wheel"), pair.gears, rolls):
-        factors = root_factors(gear, roll)
-        bending = tangential / (pair.face_width * module) * factors.form * factors.correction
+    for name, factors in zip(("pinion", "wheel"), single_contact_factors(pair)):
+        bending = tangential / (pair.face_width * module) * factors.form * factors.correction * root_helix
         found[f"{name}_form_factor"] = factors.form
         found[f"{name}_stress_correction_factor"] = factors.correction
         found[f"{name}_nominal_root_stress_MPa"] = bending

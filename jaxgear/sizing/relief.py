@@ -19,7 +19,9 @@ Scalar = Float[Array, ""]
 
 
 def long_relief_length(pair: GearPair) -> Scalar:
-    """Roll length of the double-contact zone, p_b (eps - 1) [mm]: from the outer point of single contact to the tip."""
+    """Roll length of the double-contact zone, p_b (eps_alpha - 1) [mm]: from the outer point of single contact to the
+    tip, in any transverse section of a helical pair.
+    """
     path = path_of_contact(pair)
     return path.base_pitch * (path.contact_ratio - 1)
 
@@ -60,7 +62,7 @@ def effective_relief(
     """
     check("effective_relief", "mesh_load_factor", mesh_load_factor, "", low=0.0)
     line_load = _line_load("effective_relief", pair, torque, application_factor)
-    normal = line_load * real(mesh_load_factor) / jnp.cos(jnp.deg2rad(pair.pinion.pressure_angle))
+    normal = line_load * real(mesh_load_factor) / jnp.cos(pair.pinion.transverse_pressure_angle)
     return _over(normal, iso_stiffness(pair, line_load).mesh)
 
 

@@ -44,12 +44,14 @@ _FACTORS = {
     "zone_factor": "Z_H",
     "elasticity_factor_sqrt_MPa": "Z_E",
     "contact_ratio_factor": "Z_epsilon",
+    "helix_angle_factor": "Z_beta",
     "nominal_contact_stress_MPa": "sigma_H0",
     "pinion_single_pair_contact_factor": "Z_B",
     "wheel_single_pair_contact_factor": "Z_D",
     "pinion_contact_stress_MPa": "sigma_H",
     "wheel_contact_stress_MPa": "sigma_H",
     "root_face_load_factor": "K_Fbeta",
+    "root_helix_angle_factor": "Y_beta",
     "pinion_form_factor": "Y_F",
     "wheel_form_factor": "Y_F",
     "pinion_stress_correction_factor": "Y_S",
@@ -61,7 +63,7 @@ _FACTORS = {
 }
 _RATING_NOTE = (
     "Application factor, dynamic factor and transverse load factor are 1 here, include them in the torque; so are "
-    "Y_beta, Y_B and Y_DT, for spur gears with solid bodies and contact ratios up to 2. K_Hbeta is that of the contact "
+    "Y_B and Y_DT, for solid bodies and contact ratios up to 2. K_Hbeta is that of the contact "
     "analysis, 1 on one slice."
 )
 _TOLERANCE_NOTE = (
