@@ -5,7 +5,7 @@ from jaxtyping import Array, Float
 
 from ..compliance import IsoStiffness, iso_stiffness
 from ..contact.status import Status, Statuses, status_of
-from ..geometry import Gear, GearPair, check_spur, path_of_contact
+from ..geometry import Gear, GearPair, path_of_contact
 from ..numerics import Checked, Given, check, optional_real, program, real, result
 from ..tolerance import ToleranceClass
 
@@ -76,9 +76,10 @@ def iso_dynamic_factor(
     reduced_mass: Given | None = None,
     run_in: Given = _RUN_IN,
 ) -> IsoDynamicFactor:
-    """K_v of a spur gear pair.
+    """K_v of a gear pair.
 
-    B_p = c' f_pb_eff / w, B_f = c' f_falpha_eff / w, B_k = |1 - c' C_a / w|.
+    B_p = c' f_pb_eff / w, B_f = c' f_falpha_eff / w, B_k = |1 - c' C_a / w|, with C_v1 ... C_v7 at the total contact
+    ratio eps_gamma = eps_alpha + eps_beta and the transverse base pitch deviation f_pb = f_p cos(alpha_t).
 
     Args:
         pair: gear pair.
@@ -95,7 +96,6 @@ def iso_dynamic_factor(
             nitrided gears (without the standard's upper limits in um).
     """
     owner = "iso_dynamic_factor"
-    check_spur(owner, *pair.gears)
     check(owner, "torque", torque, "N m", low=0.0, open_low=True)
     check(owner, "speed", speed, "rpm", low=0.0)
     check(owner, "tip_relief", tip_relief, "um", low=0.0)
@@ -172,7 +172,7 @@ def factor_of(
 def _deviations(pair: GearPair, quality_class) -> tuple[Scalar, Scalar]:
     """f_pb and f_falpha [um], the larger of both gears'."""
     gears = [(gear, ToleranceClass.of(gear, quality_class)) for gear in (pair.pinion, pair.wheel)]
-    base = [limits.single_pitch * jnp.cos(jnp.deg2rad(gear.pressure_angle)) for gear, limits in gears]
+    base = [limits.single_pitch * jnp.cos(gear.transverse_pressure_angle) for gear, limits in gears]
     return jnp.maximum(*base), jnp.maximum(*(limits.profile_form for _, limits in gears))
 
 
@@ -191,7 +191,7 @@ def _factor(pair, torque, speed, tip_relief, application, run_in, pitch, form, m
     )
     ratio = speed / resonance
     begins = jnp.where(load >= 100, 0.85, 0.5 + 0.35 * jnp.sqrt(jnp.minimum(load, 100.0) / 100))
-    constants = constants_of(path_of_contact(pair).contact_ratio)
+    constants = constants_of(path_of_contact(pair).contact_ratio + pair.overlap_ratio)
     pitch_line = 2 * jnp.pi * pinion.pitch_radius * _MM * speed / 60
     u = pair.gear_ratio
     usable = pitch_line * pinion.teeth / 100 * u / jnp.sqrt(1 + u**2)
