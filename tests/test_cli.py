@@ -322,7 +322,7 @@ def test_all_result_files_are_there(folder, analyzed, optimized, iterated):
     of_others = {"ppte_distribution.png"}  # no tolerances
     of_others |= {"front.csv", "front.png"}
     # one slice shows nothing over the face
-    of_others |= {"lead_chart.png", "pressure_map.png", "contact_pattern.png"}
+    of_others |= {"lead_chart.png", "pressure_map.png", "contact_pattern.png", "plane_of_action.png"}
     of_others |= {"line_load.png", "face_gap.png", "face_load_over_torque.png"}
     of_others |= {"responses.csv", "dynamic_factor.png", "dte_rms.png", "waterfall.png", "bifurcation.png"}
     of_others |= {

@@ -68,11 +68,13 @@ def draw(mesh, designs, cycles, curves):
         "load_sharing": lambda ax=None: plot.load_sharing(cycles, ax),
         "pressure": lambda ax=None: plot.pressure(cycles, ax),
         "pressure_map": lambda ax=None: plot.pressure_map(cycles["long relief"], ax),
+        "plane_of_action": lambda ax=None: plot.plane_of_action(cycles["long relief"], ax),
         "contact_pattern": lambda ax=None: plot.contact_pattern(cycles["long relief"], ax),
         "line_load": lambda ax=None: plot.line_load(cycles["long relief"], ax),
         "face_gap": lambda ax=None: plot.face_gap(cycles["long relief"], mesh, ax),
         "face_load_over_torque": lambda ax=None: plot.face_load_over_torque(TORQUES, factors, ax, design_torque=TORQUE),
         "ppte_over_torque": lambda ax=None: plot.ppte_over_torque(TORQUES, ppte, ax, design_torque=TORQUE),
+        "ppte_over_overlap": lambda ax=None: plot.ppte_over_overlap(TORQUES / 50, ppte, ax, design=0.6),
         "harris_map": lambda ax=None: plot.harris_map(mesh.phase, TORQUES, curves["long relief"], ax),
         "k_chart": lambda ax=None: plot.k_chart(mesh, designs, ax),
         "lead_chart": lambda ax=None: plot.lead_chart(mesh, designs, ax),
@@ -84,11 +86,13 @@ UNITS = {
     "load_sharing": ("[mm]", "[-]"),
     "pressure": ("[mm]", "[MPa]"),
     "pressure_map": ("[mm]", "[mm]"),
+    "plane_of_action": ("[mm]", "[mm]"),
     "contact_pattern": ("[deg]", "[mm]"),
     "line_load": ("[mm]", "[N/mm]"),
     "face_gap": ("[mm]", "[µm]"),
     "face_load_over_torque": ("[N m]", "[-]"),
     "ppte_over_torque": ("[N m]", "[µm]"),
+    "ppte_over_overlap": ("[-]", "[µm]"),
     "harris_map": ("[base pitches]", "[µm]"),
     "k_chart": ("[deg]", "[µm]"),
     "lead_chart": ("[mm]", "[µm]"),
@@ -100,6 +104,7 @@ LEGENDS = (
     "load_sharing",
     "pressure",
     "ppte_over_torque",
+    "ppte_over_overlap",
     "face_load_over_torque",
     "line_load",
     "face_gap",
@@ -229,6 +234,18 @@ def test_pressure_map_has_one_row_per_slice(cycles, mesh):
     assert ax.get_ylim() == pytest.approx((-9.0, 9.0))
 
 
+def test_plane_of_action_carries_the_whole_force(cycles, mesh):
+    """Over every line of contact, corners included: slice widths times line loads sum to the force over the levers."""
+    ax = plot.plane_of_action(cycles["unmodified"])
+    drawn = np.nan_to_num(np.ma.filled(ax.collections[0].get_array(), 0.0))
+    stages = drawn.reshape(mesh.resolution.slices, mesh.resolution.pairs, -1)
+    lever = np.asarray(mesh.lever)[::-1]  # the last pair comes first
+    carried = np.einsum("spn,pn,s->n", stages, lever, np.asarray(mesh.slice_width))
+    np.testing.assert_allclose(carried, float(cycles["unmodified"].force), rtol=1e-9)
+    corner = ax.collections[0].get_coordinates()[0, :-1, 0] < float(mesh.path_of_contact.start)
+    assert drawn[:, corner].any() and ax.get_xlim()[0] < float(mesh.path_of_contact.start)
+
+
 def test_contact_pattern_is_the_pressure_map_over_the_flanks_of_both_gears(cycles, mesh):
     cycle = cycles["long relief"]
     panels = plot.contact_pattern(cycle)
@@ -308,6 +325,11 @@ def test_ppte_over_torque_marks_the_design_torque(curves):
     assert ax.texts[0].xy[0] == TORQUE
     low, high = ax.get_xlim()  # that of the data with some air, not from zero
     assert 0.1 > (min(TORQUES) - low) / np.ptp(TORQUES) > 0 and 0.1 > (high - max(TORQUES)) / np.ptp(TORQUES) > 0
+
+
+def test_overlap_marks_whole_ratios():
+    ax = plot.ppte_over_overlap([0.4, 1.2, 2.3], {"unmodified": [3.0, 1.0, 0.5]}, design=1.2)
+    assert [line.get_xdata()[0] for line in ax.lines[1:]] == [1.2, 1.0, 2.0]
 
 
 def test_the_design_that_a_figure_is_about_is_the_boldest(curves):

@@ -32,6 +32,7 @@ RESULT_FILES = frozenset(
         "k_chart.png",
         "lead_chart.png",
         "pressure_map.png",
+        "plane_of_action.png",
         "contact_pattern.png",
         "contact_pattern_unmodified.png",
         "contact_pattern_layout.png",

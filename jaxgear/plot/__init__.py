@@ -23,6 +23,7 @@ from .flank import face_gap as face_gap
 from .flank import k_chart as k_chart
 from .flank import lead_chart as lead_chart
 from .flank import line_load as line_load
+from .flank import plane_of_action as plane_of_action
 from .flank import pressure_map as pressure_map
 from .flank import topography as topography
 from .front import optimum_front as optimum_front
@@ -45,6 +46,7 @@ from .variants import fan as fan
 from .variants import harris_map as harris_map
 from .variants import ppte_distribution as ppte_distribution
 from .variants import ppte_histogram as ppte_histogram
+from .variants import ppte_over_overlap as ppte_over_overlap
 from .variants import ppte_over_torque as ppte_over_torque
 from .variants import response_surface as response_surface
 from .wear import wear_history as wear_history

@@ -259,7 +259,7 @@ def _over_roll_angle(panel: Axes, side: Side, title: str) -> None:
     upper.tick_params(labelsize=panel.xaxis.label.get_fontsize(), width=0.6, length=3)
 
 
-_FACE_LABEL, _PRESSURE_LABEL = "face coordinate [mm]", "flank pressure [MPa]"
+_FACE_LABEL, _PRESSURE_LABEL, _LOAD_LABEL = "face coordinate [mm]", "flank pressure [MPa]", "line load [N/mm]"
 
 
 def pressure_map(cycle: MeshCycle, ax: Axes | None = None) -> Axes:
@@ -271,16 +271,39 @@ def pressure_map(cycle: MeshCycle, ax: Axes | None = None) -> Axes:
         cycle: solved cycle, of several slices to show more than one row.
         ax: Axes to draw into; None for a new figure.
     """
-    path, face, flank = _pressed(cycle)
     contact = cycle.kinematics.path_of_contact
+    air = 0.05 * float(contact.base_pitch)
+    limits = float(contact.start) - air, float(contact.end) + air
+    return _over_plane(cycle, cycle.contact_pressure, _PRESSURE_LABEL, limits, ax)
+
+
+def plane_of_action(cycle: MeshCycle, ax: Axes | None = None) -> Axes:
+    """Line load [N/mm] of one pair all over the plane of action: along the line of action and over the face.
+
+    Tip edges that go on carrying before A and after E are in it; white where nothing touches. Of helical gears a pair
+    touches along inclined lines: those at the position of the largest line load are drawn.
+
+    Args:
+        cycle: solved cycle, of several slices to show more than one row.
+        ax: Axes to draw into; None for a new figure.
+    """
+    path, _, load = _placed(cycle, cycle.line_load)
+    corners = np.stack([path[:-1, :-1], path[1:, :-1], path[:-1, 1:], path[1:, 1:]])[:, np.isfinite(load)]
+    contact = cycle.kinematics.path_of_contact
+    air = 0.05 * float(contact.base_pitch)
+    limits = corners.min(initial=float(contact.start)) - air, corners.max(initial=float(contact.end)) + air
+    return _over_plane(cycle, cycle.line_load, _LOAD_LABEL, limits, ax)
+
+
+def _over_plane(cycle: MeshCycle, values: Array, label: str, limits: tuple[float, float], ax: Axes | None) -> Axes:
+    """What one pair goes through, over its path and the face, with the contact lines of helical gears."""
+    path, face, shown = _placed(cycle, values)
     with report_axes(ax) as ax:
-        colour_bar(_draw(ax, path, face, flank, None), ax, _PRESSURE_LABEL, pad=0.02)
+        colour_bar(_draw(ax, path, face, shown, None), ax, label, pad=0.02)
         for line in _contact_lines(cycle):
             ax.plot(line, face, color="black", linewidth=0.7)
-        mark_path(ax, contact, zorder=3)
-        air = 0.05 * float(contact.base_pitch)
-        ax.set_xlim(float(contact.start) - air, float(contact.end) + air)
-        ax.set(ylim=(face[0], face[-1]), xlabel=PATH_LABEL, ylabel=_FACE_LABEL)
+        mark_path(ax, cycle.kinematics.path_of_contact, zorder=3)
+        ax.set(xlim=limits, ylim=(face[0], face[-1]), xlabel=PATH_LABEL, ylabel=_FACE_LABEL)
     return ax
 
 
@@ -297,7 +320,7 @@ def contact_pattern(cycle: MeshCycle, ax: Panels | None = None) -> np.ndarray:
     Returns:
         the two Axes.
     """
-    path, face, flank = _pressed(cycle)
+    path, face, flank = _placed(cycle, cycle.contact_pressure)
     most = float(np.nanmax(flank, initial=0.0))
     with report_axes(ax, columns=2, width=WIDTH) as panels:
         for panel, title, side, sign in zip(panels, ("pinion", "wheel"), cycle.sides, (1.0, -1.0)):
@@ -313,15 +336,15 @@ def contact_pattern(cycle: MeshCycle, ax: Panels | None = None) -> np.ndarray:
     return np.asarray(panels)
 
 
-def _pressed(cycle: MeshCycle) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _placed(cycle: MeshCycle, values: Array) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Edges of path positions at the ends of the slices and of the slices [mm], shapes (slices + 1, edges) and (slices
-    + 1,), and the pressure between them [MPa]; NaN where the flanks part.
+    + 1,), and the values of shape (pairs, slices, positions) between them; NaN where the flanks part.
     """
-    path, flank = pair_history(cycle, cycle.contact_pressure)
+    path, shown = pair_history(cycle, values)
     step, face = path[1] - path[0], _ends(cycle)
     middle = np.append(path, path[-1] + step) - 0.5 * step
     ahead = face * float(cycle.kinematics.pair.path_slope)
-    return middle + ahead[:, None], face, np.where(flank > 0, flank, np.nan)
+    return middle + ahead[:, None], face, np.where(shown > 0, shown, np.nan)
 
 
 def _ends(cycle: MeshCycle) -> np.ndarray:
@@ -373,7 +396,7 @@ def line_load(cycle: MeshCycle, ax: Axes | None = None, *, position: int | None 
             ax.plot(face, curve, label=name, **style)
             if not cycle.kinematics.helical or index == len(loaded):
                 ax.axhline(mean, color=style["color"], linewidth=0.6, zorder=0.6)
-        ax.set(ylim=(0, None), ylabel="line load [N/mm]")
+        ax.set(ylim=(0, None), ylabel=_LOAD_LABEL)
         _finish(ax, cycle, where)
     return ax
 

@@ -245,6 +245,7 @@ def ppte_distribution(
     return ax
 
 
+_PPTE_LABEL = "peak-to-peak\ntransmission error [µm]"
 _DARK, _LIGHT = 0.0, 0.72  # part of the colour map that shows on white
 
 
@@ -261,7 +262,29 @@ def ppte_over_torque(
     """
     with report_axes(ax) as ax:
         _over_torque(ax, torques, curves, design_torque)
-        ax.set(ylim=(0, None), ylabel="peak-to-peak\ntransmission error [µm]")
+        ax.set(ylim=(0, None), ylabel=_PPTE_LABEL)
+    return ax
+
+
+def ppte_over_overlap(
+    overlap_ratios: ArrayLike, curves: Mapping[str, ArrayLike], ax: Axes | None = None, design: float | None = None
+) -> Axes:
+    """PPTE [um] of several designs over the overlap ratio, as helix angle or face width change it.
+
+    Lines stand at whole overlap ratios, at which teeth of constant stiffness have no ripple.
+
+    Args:
+        overlap_ratios: `GearPair.overlap_ratio`, shape (ratios,).
+        curves: PPTE [um] by the name of the design, each of shape (ratios,).
+        ax: Axes to draw into; None for a new figure.
+        design: overlap ratio of the design; None for no mark.
+    """
+    marks = {} if design is None else {float(design): f"design {float(design):.3g}"}
+    with report_axes(ax) as ax:
+        _over(ax, overlap_ratios, curves, marks)
+        for whole in np.arange(1.0, np.ceil(ax.get_xlim()[1])):
+            ax.axvline(whole, color=GREY, linewidth=0.6, linestyle=(0, (4, 3)), zorder=0.5)
+        ax.set(ylim=(0, None), xlabel="overlap ratio $\\epsilon_\\beta$ [-]", ylabel=_PPTE_LABEL)
     return ax
 
 
@@ -284,22 +307,27 @@ def face_load_over_torque(
     return ax
 
 
-_MARGIN = 0.03  # of the range of torques, on either side
+_MARGIN = 0.03  # of the range of the abscissa, on either side
 
 
 def _over_torque(ax: Axes, torques: ArrayLike, curves: Mapping[str, ArrayLike], design_torque: float | None) -> None:
-    along = np.asarray(torques, float)
+    mark = None if design_torque is None else float(design_torque)
+    _over(ax, torques, curves, {} if mark is None else {mark: f"design torque {mark:g} N m"})
+    ax.set_xlabel("pinion torque [N m]")
+
+
+def _over(ax: Axes, abscissa: ArrayLike, curves: Mapping[str, ArrayLike], marks: Mapping[float, str]) -> None:
+    """Curves of several designs, with marks on the abscissa."""
+    along = np.asarray(abscissa, float)
     for index, name, curve in styled(curves):
         ax.plot(along, np.asarray(curve), label=name, clip_on=False, **marker_style(index))
-    marks = [] if design_torque is None else [float(design_torque)]
-    for mark in marks:
+    for mark, text in marks.items():
         ax.axvline(mark, color=GREY, linewidth=0.8, zorder=0.5)
-        text_above(ax, mark, f"design torque {mark:g} N m")
+        text_above(ax, mark, text)
     low, high = np.min([*along, *marks]), np.max([*along, *marks])
-    air = _MARGIN * (high - low) or 1.0  # of a single torque
+    air = _MARGIN * (high - low) or 1.0  # of a single place
     ax.set_xlim(low - air, high + air)
-    ax.set_xlabel("pinion torque [N m]")
-    legend_above(ax, distance=ABOVE if design_torque is None else ABOVE_MARKS)
+    legend_above(ax, distance=ABOVE_MARKS if marks else ABOVE)
 
 
 def harris_map(

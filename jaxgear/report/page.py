@@ -204,6 +204,8 @@ CAPTIONS = {
     "load_sharing": "Share of the load that one tooth pair carries on its way along the path of contact.",
     "pressure": "Largest pressure of one tooth pair along the path of contact, of flanks and tip corners (dots).",
     "pressure_map": "Pressure over path of contact and face width.",
+    "plane_of_action": "Load per length over the plane of action, tip edges before A and after E included, with the "
+    "contact lines at its largest value.",
     "contact_pattern": "Contact pattern: largest pressure of every place of the flank over a whole mesh.",
     "contact_pattern_unmodified": "Contact pattern without modification: largest pressure of every place of the flank.",
     "contact_pattern_layout": "Contact pattern after all three steps: largest pressure of every place of the flank.",

@@ -184,6 +184,8 @@ def _over_face(file: DesignFile, mesh: Mesh, evaluations: Evaluations, torques: 
 
     cycle, name = main(evaluations).cycle, main_name(evaluations)
     maps = {"pressure_map": plot.pressure_map(cycle), "contact_pattern": plot.contact_pattern(cycle)}
+    if cycle.kinematics.helical:
+        maps["plane_of_action"] = plot.plane_of_action(cycle)
     for drawn in maps.values():
         np.ravel(drawn)[0].set_title(name, loc="left", fontsize=_TITLE)
     lines = {"line_load": plot.line_load(cycle), "face_gap": plot.face_gap(cycle, mesh)}
