@@ -21,3 +21,14 @@ def pair_of(beta=15.0, width=20.0, bores=(20.0, 100.0), **given) -> jg.GearPair:
 def solved(beta=15.0, slope=0.0) -> tuple[jg.Mesh, jg.MeshCycle]:
     mesh = jg.prepare(pair_of(beta), resolution=SIZES)
     return mesh, jg.solve(mesh, TORQUE, pinion=jg.LeadSlope(slope))
+
+
+@cache
+def example() -> jg.GearPair:
+    """The gears of the first worked example of ISO/TR 6336-30."""
+    rack = {"face_width": 100.0, "dedendum": 1.4, "root_radius": 0.39}
+    return jg.GearPair(
+        jg.Gear(17, 8.0, 20.0, 0.145, helix_angle=15.8, tip_diameter=159.66, **rack),
+        jg.Gear(103, 8.0, 20.0, 0.0, helix_angle=-15.8, tip_diameter=872.35, **rack),
+        center_distance=500.0,
+    )

@@ -11,12 +11,11 @@ import pytest
 from helical_pairs import SIZES, TORQUE, pair_of, solved
 
 import jaxgear as jg
-from jaxgear import manufacture, wear
+from jaxgear import manufacture, plot, wear
 from jaxgear.compliance import finite_element_compliance
 from jaxgear.compliance.laws import LinearLaw
 from jaxgear.compliance.plate import axial_compliance
 from jaxgear.contact import helical_slices
-from jaxgear.dynamics.iso_6336 import iso_dynamic_factor
 from jaxgear.geometry import path_of_contact, tooth_thickness
 
 
@@ -115,6 +114,21 @@ def test_slices_far_along_the_path_touch_later():
     np.testing.assert_allclose(np.diff(path, axis=1), ahead, rtol=1e-12)  # a right hand: the positive end comes first
     start = float(mesh.path_of_contact.start)
     assert load[path < start - 0.2 * float(mesh.pair.base_pitch)].max() == 0
+
+
+@pytest.mark.usefixtures("clean_figures")
+def test_the_plane_of_action_has_inclined_lines_that_carry_the_force():
+    mesh, cycle = solved()
+    ax = plot.plane_of_action(cycle)
+    stages = np.nan_to_num(np.ma.filled(ax.collections[0].get_array(), 0.0)).reshape(5, 4, 8)
+    lever = np.asarray(mesh.lever)[::-1]  # the last pair comes first
+    carried = np.einsum("spn,psn,s->n", stages, lever, np.asarray(mesh.slice_width))
+    np.testing.assert_allclose(carried, float(cycle.force), rtol=1e-9)
+    lines = [line.get_xydata() for line in ax.lines if len(line.get_xdata()) == 6]  # ends of the slices
+    for line in lines:
+        steps = np.diff(line[np.isfinite(line).all(axis=1)], axis=0)
+        np.testing.assert_allclose(steps[:, 0] / steps[:, 1], float(mesh.pair.path_slope), rtol=1e-9)
+    assert any(np.isfinite(line).all() for line in lines)  # all over the face
 
 
 @pytest.mark.parametrize("width, beta", [(20.0, 15.0), (36.0, 15.0)])
@@ -228,7 +242,6 @@ REFUSED = {
     "path": lambda: solved()[0].path,
     "outside": lambda: solved()[1].kinematics.outside,
     "finite elements": lambda: finite_element_compliance(pair_of(None)).check(pair_of()),
-    "K_v": lambda: iso_dynamic_factor(pair_of(), TORQUE, 1000.0),
     "wear": lambda: wear.wear(solved()[0], TORQUE, coefficient=1e-18, revolutions=1e6),
     "form wheel": lambda: manufacture.wheel_profile(solved()[0].sides[0], jg.TipRelief(5.0, 2.0)),
 }

@@ -1,4 +1,4 @@
-"""Helical gears at speed: the force of their mesh, coast flanks, inclined lines of action on bearings, K_v."""
+"""Helical gears at speed: the force of their mesh, coast flanks, inclined lines of action on bearings."""
 
 from functools import cache
 

@@ -1,14 +1,13 @@
 """Quantities, stiffness, stresses and losses of helical pairs: closed forms, published values and spur limit."""
 
 from dataclasses import replace
-from functools import cache
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from helical_pairs import SIZES, TORQUE, pair_of, solved
+from helical_pairs import SIZES, TORQUE, example, pair_of, solved
 
 import jaxgear as jg
 from jaxgear import metrics, sizing
@@ -30,17 +29,6 @@ NAMES = (
     "shuttling_moment mean_shuttling_moment removed_material mesh_loss_factor loss_power max_flash_temperature "
     "min_film_thickness pinion_local_root_stress wheel_root_safety pinion_pitting_safety"
 ).split()
-
-
-@cache
-def example() -> jg.GearPair:
-    """The gears of the first worked example of ISO/TR 6336-30."""
-    rack = {"face_width": 100.0, "dedendum": 1.4, "root_radius": 0.39}
-    return jg.GearPair(
-        jg.Gear(17, 8.0, 20.0, 0.145, helix_angle=15.8, tip_diameter=159.66, **rack),
-        jg.Gear(103, 8.0, 20.0, 0.0, helix_angle=-15.8, tip_diameter=872.35, **rack),
-        center_distance=500.0,
-    )
 
 
 def running(beta=15.0, slope=0.0) -> jg.MeshCycle:

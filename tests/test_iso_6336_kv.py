@@ -4,6 +4,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from helical_pairs import example, pair_of
 
 import jaxgear as jg
 from jaxgear.contact.status import Status
@@ -95,6 +96,26 @@ def test_reduced_mass_is_that_of_discs_of_mean_diameter(pair):
     # for an inertia of its own
     given = iso_dynamic_factor(pair, torque=200.0, speed=100.0, reduced_mass=0.785 / 20)
     assert np.isclose(given.resonance_speed / found.resonance_speed, np.sqrt(found.reduced_mass / (0.785 / 20)))
+
+
+def test_helical_gears_of_the_worked_example():
+    """ISO/TR 6336-30, example 1, prints 1.003."""
+    found = iso_dynamic_factor(example(), torque=9000.0, speed=360.0, quality_class=5, tip_relief=70.0)
+    assert float(found.factor) == pytest.approx(1.003, abs=5e-4)
+    assert np.allclose(found.constants, constants_of(1.54909 + 1.08337), rtol=1e-4)
+    pinion, wheel = example().gears
+    angle = np.arctan(np.tan(np.deg2rad(20)) / np.cos(np.deg2rad(15.8)))  # of the transverse section
+    base = 0.925 * float(ToleranceClass.of(wheel, 5).single_pitch) * np.cos(angle)
+    assert float(found.pitch) == pytest.approx(base * 12.37047 / float(found.line_load), rel=1e-6)
+    assert float(found.line_load) == pytest.approx(9e6 / float(pinion.pitch_radius) / 100)
+
+
+def test_a_small_angle_has_the_factor_of_spur_gears():
+    spur, nearly, small, large = (
+        float(iso_dynamic_factor(pair_of(beta), torque=150.0, speed=6000.0, quality_class=6).factor)
+        for beta in (None, 1e-6, 0.1, 15.0)
+    )
+    assert nearly == pytest.approx(spur, rel=1e-6) and small == pytest.approx(spur, rel=1e-5) and 1 < large < spur
 
 
 def test_slow_gears_are_told(pair):
