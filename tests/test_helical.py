@@ -11,7 +11,7 @@ import pytest
 from helical_pairs import SIZES, TORQUE, pair_of, solved
 
 import jaxgear as jg
-from jaxgear import manufacture, plot, wear
+from jaxgear import manufacture, plot
 from jaxgear.compliance import finite_element_compliance
 from jaxgear.compliance.laws import LinearLaw
 from jaxgear.compliance.plate import axial_compliance
@@ -242,7 +242,6 @@ REFUSED = {
     "path": lambda: solved()[0].path,
     "outside": lambda: solved()[1].kinematics.outside,
     "finite elements": lambda: finite_element_compliance(pair_of(None)).check(pair_of()),
-    "wear": lambda: wear.wear(solved()[0], TORQUE, coefficient=1e-18, revolutions=1e6),
     "form wheel": lambda: manufacture.wheel_profile(solved()[0].sides[0], jg.TipRelief(5.0, 2.0)),
 }
 

@@ -23,6 +23,10 @@ rolling, slides past its mate by 2 a |u1 - u2| / u_i, and wears by
 
 p the mean pressure, q the line load, u the rolling speeds of the flanks: the half width of the contact drops out.
 
+Flanks of helical gears slide in the transverse section, along their profiles and across the contact line, every slice
+of the face at its own phase. The line load per face width is the normal force per length of the contact line, so that
+dh_i is normal to the flank; depths here are those in the transverse section, as modifications are: dh_i / cos(beta_b).
+
 References:
     J. F. Archard, J. Appl. Phys. 24 (1953) 981-988, doi 10.1063/1.1721448.
     A. Flodin, S. Andersson, Simulation of mild wear in spur gears, Wear 207 (1997) 16-23.
@@ -40,10 +44,9 @@ from ..contact import Mesh, MeshCycle
 from ..contact.contact_width import contact_nodes, place_of
 from ..contact.kinematics import contacts
 from ..geometry import PathOfContact
-from ..numerics import Given, Numbers, check, program, real, safe_divide, safe_sqrt
+from ..numerics import Given, Numbers, check, over_slices, program, real, safe_divide, safe_sqrt
 
 Scalar = Float[Array, ""]
-Field = Float[Array, "pairs positions"]
 
 # Places along the piece of a position. On a grid coarser than a step the depth changes by 1e-4 with twice as many.
 _PLACES = 8
@@ -58,6 +61,8 @@ PARTS = "flank", "corner"
 class Deposit(eqx.Module):
     """Where contacts wear the flanks of pinion and wheel, in this order along the axis gears.
 
+    Of helical gears what has the axes (pairs, positions) has (pairs, slices, positions).
+
     Attributes:
         roll_length: of the grid points, from the start of the active profile to the tip [mm], shape (gears, points).
         arc: of the flank that belongs to every point [mm], shape (gears, points).
@@ -65,13 +70,15 @@ class Deposit(eqx.Module):
         spreads: sliding by the points where contacts leave their wear [mm], from those without width to those of the
             full load, shape (widths, gears, parts, points, pairs, positions).
         full_load: line load of one pair that carries all [N/mm].
+        inclination: cos(beta_b), depth normal to the flank over that in the transverse section.
     """
 
     roll_length: Float[Array, "gears points"]
     arc: Float[Array, "gears points"]
-    sliding: Float[Array, "parts pairs positions"]
-    spreads: Float[Array, "widths gears parts points pairs positions"]
+    sliding: Float[Array, "parts pairs *own positions"]
+    spreads: Float[Array, "widths gears parts points pairs *own positions"]
     full_load: Scalar
+    inclination: Scalar
 
     def shares(self, line_load: Float[Array, "*contacts"]) -> Float[Array, "widths *contacts"]:
         """What each of the `spreads` counts for in contacts under line loads [N/mm], as wide as the root of these."""
@@ -96,18 +103,21 @@ def arcs(roll_length: Float[Array, " points"], base_radius: Scalar) -> Float[Arr
 @program
 def deposit(mesh: Mesh, torque: Scalar, points: int) -> Deposit:
     """The deposit of a mesh under a torque on the pinion [N m], which tells how wide its contacts are."""
-    contact, dtype = mesh.path_of_contact, mesh.slice_width.dtype
+    contact, path, dtype = mesh.path_of_contact, mesh.kinematics.contact_path, mesh.slice_width.dtype
     step = contact.base_pitch / mesh.resolution.positions
     # middle of every part of a piece, and its ends
-    middles = jnp.asarray((np.arange(_PLACES) + 0.5) / _PLACES - 0.5, dtype)[None, None]
-    ends = jnp.asarray(np.arange(_PLACES + 1) / _PLACES - 0.5, dtype)[None, None]
-    sliding = _sliding(mesh, mesh.path[..., None] + step * ends)
-    at = contacts(mesh.pair, contact, mesh.path[..., None] + step * middles)
+    middles, ends = (np.arange(_PLACES) + 0.5) / _PLACES - 0.5, np.arange(_PLACES + 1) / _PLACES - 0.5
+
+    def along(places: np.ndarray) -> Array:
+        return path[..., None] + step * jnp.asarray(places, dtype).reshape(*[1] * path.ndim, -1)
+
+    sliding = _sliding(mesh, along(ends))
+    at = contacts(mesh.pair, contact, along(middles))
     rolls = at.pinion_roll_length, at.wheel_roll_length
-    half_width = place_of(mesh, torque).half_width[:, 0, :, None]
+    half_width = place_of(mesh, torque).half_width.reshape(path.shape)[..., None]
     lengths = grid(mesh, points)
 
-    def over(width) -> Float[Array, "gears parts points pairs positions"]:
+    def over(width) -> Float[Array, "gears parts points pairs *own positions"]:
         made = [
             _spread(roll, width * half_width, sliding, knots, side.base_radius, mesh.resolution.contact_nodes)
             for roll, side, knots in zip(rolls, mesh.sides, lengths)
@@ -117,10 +127,13 @@ def deposit(mesh: Mesh, torque: Scalar, points: int) -> Deposit:
     spreads = jax.lax.map(over, jnp.linspace(0.0, 1.0, _WIDTHS, dtype=dtype))
     arc = jnp.stack([arcs(knots, side.base_radius) for knots, side in zip(lengths, mesh.sides)])
     full_load = 1e3 * torque / (mesh.pair.pinion.base_radius * mesh.pair.face_width)
-    return Deposit(lengths, arc, jnp.sum(sliding, axis=-1), spreads, full_load)
+    inclination = jnp.cos(mesh.pair.pinion.base_helix_angle)
+    return Deposit(lengths, arc, jnp.sum(sliding, axis=-1), spreads, full_load, inclination)
 
 
-def _sliding(mesh: Mesh, ends: Float[Array, "pairs positions ends"]) -> Float[Array, "parts pairs positions places"]:
+def _sliding(
+    mesh: Mesh, ends: Float[Array, "pairs *own positions ends"]
+) -> Float[Array, "parts pairs *own positions places"]:
     """Sliding between neighbouring ends [mm], on the flank and of tip corners."""
     contact = mesh.path_of_contact
     on_path = jnp.clip(ends, contact.start, contact.end)
@@ -137,7 +150,9 @@ def _sliding(mesh: Mesh, ends: Float[Array, "pairs positions ends"]) -> Float[Ar
     return jnp.stack([jnp.diff(flank, axis=-1), jnp.abs(jnp.diff(corner, axis=-1))])
 
 
-def _spread(roll, half_width, sliding, knots, base_radius, nodes: int) -> Float[Array, "parts points pairs positions"]:
+def _spread(
+    roll, half_width, sliding, knots, base_radius, nodes: int
+) -> Float[Array, "parts points pairs *own positions"]:
     """Sliding by the points of one grid."""
     total = jnp.zeros((sliding.shape[0], *knots.shape, *roll.shape[:-1]), roll.dtype)
     width, first, last = knots[1] - knots[0], _arc(knots[0], base_radius), _arc(knots[-1], base_radius)
@@ -146,8 +161,8 @@ def _spread(roll, half_width, sliding, knots, base_radius, nodes: int) -> Float[
         # the contact ends with the flank: the share that would lie beyond wears what is left of it
         arc = jnp.clip(jnp.where(arc < first, 2 * first - arc, jnp.where(arc > last, 2 * last - arc, arc)), first, last)
         place = jnp.clip(jnp.sqrt(2 * base_radius * arc), knots[0], knots[-1])
-        hat = jnp.maximum(1 - jnp.abs(place[None] - knots[:, None, None, None]) / width, 0.0)
-        total = total + node.mean * jnp.einsum("xijm,kijm->kxij", hat, sliding)
+        hat = jnp.maximum(1 - jnp.abs(place[None] - knots.reshape(-1, *[1] * place.ndim)) / width, 0.0)
+        total = total + node.mean * jnp.einsum("x...m,k...m->kx...", hat, sliding)
     return total
 
 
@@ -177,32 +192,38 @@ def specific_sliding(contact: PathOfContact, path: Given) -> tuple[Float[Array, 
 def passage_depth(cycle: MeshCycle, coefficient: Numbers) -> tuple[Load, Load]:
     """Wear depth that one passage of a pair leaves where every contact of a cycle is, on pinion and wheel [um].
 
+    In the transverse section, as that of a modification.
+
     Args:
         cycle: solved mesh cycle, without batch axes.
         coefficient: of wear [m2/N], a number, or one for every contact, shape (pairs, slices, positions).
 
     Returns:
-        k_w q |u1 - u2| / u_i of both gears, shape (pairs, slices, positions) each.
+        k_w q |u1 - u2| / (u_i cos(beta_b)) of both gears, shape (pairs, slices, positions) each.
 
     Raises:
         ValueError: for a negative coefficient.
     """
     coefficient = real(coefficient).astype(cycle.line_load.dtype)
     check("passage_depth", "coefficient", coefficient, "m2/N", low=0.0)
-    pinion, wheel = specific_sliding(cycle.kinematics.path_of_contact, cycle.kinematics.path)
-    worn = UM_PER_LOAD * coefficient * cycle.line_load
-    return worn * pinion[:, None], worn * wheel[:, None]
+    moving = cycle.kinematics
+    pinion, wheel = map(over_slices, specific_sliding(moving.path_of_contact, moving.contact_path))
+    worn = UM_PER_LOAD * coefficient * cycle.line_load / jnp.cos(moving.pair.pinion.base_helix_angle)
+    return worn * pinion, worn * wheel
 
 
 @program
 def worn(line_load: Load, coefficient: Given, place: Deposit) -> Float[Array, "gears parts slices points"]:
     """Wear depth that one passage leaves on the grids of both flanks [um], on the flank and by tip corners.
 
+    In the transverse section, as that of a modification.
+
     Args:
         line_load: [N/mm], shape (pairs, slices, positions).
         coefficient: of wear [m2/N]; of every gear and contact, to be broadcast to (gears, pairs, slices, positions).
         place: where contacts wear the flanks.
     """
-    worn = jnp.broadcast_to(UM_PER_LOAD * coefficient * line_load[None], (2, *line_load.shape))
-    left = place.shares(line_load)[:, None] * worn[None]
-    return jnp.einsum("ugkxij,ugisj->gksx", place.spreads, left) / place.arc[:, None, None]
+    taken = UM_PER_LOAD * coefficient * line_load[None] / place.inclination
+    left = place.shares(line_load)[:, None] * jnp.broadcast_to(taken, (2, *line_load.shape))[None]
+    axes = "isj" if place.sliding.ndim == line_load.ndim + 1 else "ij"
+    return jnp.einsum(f"ugkx{axes},ugisj->gksx", place.spreads, left) / place.arc[:, None, None]

@@ -1,0 +1,100 @@
+"""Wear of helical flanks: every slice slides at its own phase and loses what its normal force slides."""
+
+from functools import cache
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from helical_pairs import SIZES, TORQUE, pair_of, solved
+
+import jaxgear as jg
+from jaxgear import wear
+from jaxgear.wear.worn_volume import deposit, worn
+
+POINTS, COEFFICIENT = 17, 1e-18
+INCLINED = np.cos(np.deg2rad(14.0761))  # base helix angle, of the check values of the pair
+
+
+@pytest.fixture(scope="module")
+def mesh():
+    return jg.prepare(pair_of(), resolution=SIZES)
+
+
+@pytest.fixture(scope="module")
+def place(mesh):
+    return deposit(mesh, jnp.asarray(TORQUE), POINTS)
+
+
+def slid(mesh):
+    """Sliding of every position of every slice on the path of contact [mm], in the transverse section."""
+    contact = mesh.path_of_contact
+    half = 0.5 * float(contact.base_pitch) / mesh.resolution.positions * np.array([-1, 1])
+    ends = np.asarray(mesh.kinematics.contact_path)[..., None] + half
+    ends = np.clip(ends, float(contact.start), float(contact.end))
+    inverse = 1 / float(contact.pinion_base_radius) + 1 / float(contact.wheel_base_radius)
+    return np.diff(0.5 * ends * np.abs(ends), axis=-1)[..., 0] * inverse
+
+
+def test_every_slice_slides_over_the_whole_path_of_contact(mesh, place):
+    contact, found = mesh.path_of_contact, np.asarray(place.sliding)[0]
+    np.testing.assert_allclose(found, slid(mesh), atol=1e-12)
+    inverse = 1 / float(contact.pinion_base_radius) + 1 / float(contact.wheel_base_radius)
+    whole = 0.5 * (float(contact.start) ** 2 + float(contact.end) ** 2) * inverse
+    np.testing.assert_allclose(found.sum(axis=(0, 2)), whole, rtol=1e-12)
+
+
+def test_an_even_load_wears_all_slices_by_the_formula(mesh, place):
+    """k w |u1 - u2| / u normal to the flank, and as a modification over cos(beta_b), whatever the phase of a slice."""
+    load = jnp.full(mesh.kinematics.contact_path.shape, 100.0)
+    depth = np.asarray(worn(load, jnp.full((2, 1, 1, 1), COEFFICIENT), place))[:, 0]
+    contact, length = mesh.path_of_contact, np.asarray(place.roll_length)
+    at = length[0] - float(contact.pinion_pitch_roll_length), float(contact.wheel_pitch_roll_length) - length[1]
+    exact = np.stack([wear.specific_sliding(contact, s)[gear] for gear, s in enumerate(at)])
+    exact = 1e9 * COEFFICIENT * 100.0 * exact / INCLINED
+    inner = np.abs(np.stack(at)) > 1.5  # of the pitch point, where the depth has a kink
+    inner[:, [0, 1, -1]] = False  # ends of the flank, where the contact is as wide as the grid
+    error = np.abs(depth - exact[:, None]) / exact.max()
+    assert error[np.broadcast_to(inner[:, None], error.shape)].max() < 0.012
+    assert np.abs(depth - depth[:, :1]).max() < 0.02 * depth.max()
+
+
+@cache
+def life_of(beta=15.0, slope=0.0, revolutions=2e6):
+    given = {"coefficient": (1.3e-18, 0.4e-18), "blocks": 2, "points": POINTS, "pinion": jg.LeadSlope(slope)}
+    found = wear.wear(solved(beta, slope)[0], TORQUE, revolutions, **given)
+    assert bool(found.converged.all())
+    return found
+
+
+@pytest.mark.slow
+def test_worn_volume_is_coefficient_times_normal_force_times_sliding():
+    """Of the contact of new flanks, every gear by its own coefficient and revolutions."""
+    mesh, cycle = solved()
+    normal = np.asarray(cycle.line_load) * np.asarray(mesh.slice_width)[:, None] / INCLINED
+    lost = 1e6 * np.array([1.3e-18, 0.4e-18]) * np.array([1.0, 19 / 48]) * np.sum(normal * slid(mesh))
+    # so few revolutions that the flanks stay those
+    np.testing.assert_allclose(wear.worn_volume(life_of(revolutions=1e-3))[-1, :, 0], 1e-3 * lost, rtol=1e-5)
+
+
+@pytest.mark.slow
+def test_a_small_angle_wears_as_the_spur_gear():
+    spur, small = life_of(None), life_of(1e-6)
+    assert float(wear.wear_depth(spur)[-1]) > 0.5
+    np.testing.assert_allclose(small.depth, spur.depth, atol=1e-5)
+
+
+@pytest.mark.slow
+def test_the_other_hand_wears_as_the_mirrored_face():
+    right, left = life_of(15.0, 20.0), life_of(-15.0, -20.0)
+    # contacts that slide down the kinks of a table see rounding
+    np.testing.assert_allclose(left.depth[..., ::-1, :], right.depth, atol=1e-6)
+    assert float(np.ptp(np.asarray(right.pinion_depth)[-1].max(axis=-1))) > 0.1  # the slope gathers wear at one end
+
+
+@pytest.mark.slow
+def test_the_flanks_of_a_life_give_its_mesh_again():
+    life = life_of()
+    pinion, wheel = life.flanks()
+    again = jg.solve(solved()[0], TORQUE, pinion=pinion, wheel=wheel)
+    np.testing.assert_allclose(again.transmission_error, life.cycles.transmission_error[-1], atol=1e-3)
+    assert np.abs(again.transmission_error - life.cycles.transmission_error[0]).max() > 0.1
