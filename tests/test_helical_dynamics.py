@@ -205,6 +205,15 @@ def test_natural_frequencies_are_those_of_the_inclined_spring():
     np.testing.assert_allclose(np.asarray(rigid)[[0, 1, 2, 4, 5]], flat, atol=1e-4)
 
 
+def test_settings_with_a_third_direction_are_those_bearings():
+    given = {name: np.diag(each) for name, each in zip(("pinion_bearing", "wheel_bearing"), BEARINGS)}
+    dampings = {f"{name}_damping": 1e-4 * values for name, values in given.items()}
+    made = dynamics.Dynamics([1000.0], **given, **dampings).masses(SPRING, pair_of(), jnp.asarray(TORQUE))
+    wanted = held(bearing_damping=1e-4 * BEARINGS)
+    for name in ("direction", "mass", "stiffness", "damping", "load"):
+        np.testing.assert_allclose(getattr(made, name), getattr(wanted, name), rtol=1e-12)
+
+
 def test_a_spur_pair_does_not_move_along_its_axis():
     found = at_rest(held(beta=None), jnp.asarray(0.0)).coordinates
     assert not np.asarray(found)[[3, 6]].any()

@@ -356,7 +356,7 @@ def _contact_lines(cycle: MeshCycle) -> list[np.ndarray]:
     """Path positions [mm] of all pairs of helical gears where slices end, at the position of the largest line load."""
     if not cycle.kinematics.helical:
         return []
-    middle = middle_path(cycle)[:, _heaviest(cycle)[1]]
+    middle = middle_path(cycle)[:, _heaviest(cycle)]
     contact = cycle.kinematics.path_of_contact
     lines = middle[:, None] + _ends(cycle) * float(cycle.kinematics.pair.path_slope)
     on_path = (lines >= float(contact.start)) & (lines <= float(contact.end))
@@ -381,7 +381,7 @@ def line_load(cycle: MeshCycle, ax: Axes | None = None, *, position: int | None 
         ax: Axes to draw into; None for a new figure.
         position: number of the mesh position; None for that with the largest line load.
     """
-    where = _heaviest(cycle)[1] if position is None else position
+    where = _heaviest(cycle) if position is None else position
     load = np.asarray(cycle.line_load)[:, :, where]
     face, width = (np.asarray(of) for of in (cycle.kinematics.face_coordinate, cycle.kinematics.slice_width))
     with report_axes(ax) as ax:
@@ -402,7 +402,8 @@ def line_load(cycle: MeshCycle, ax: Axes | None = None, *, position: int | None 
 
 
 def face_gap(cycle: MeshCycle, mesh: Mesh, ax: Axes | None = None, *, position: int | None = None) -> Axes:
-    """Gap [um] between the flanks of the most loaded pair over the face at one mesh position, unloaded and under load.
+    """Gap [um] between the flanks of the pair with the largest force over the face at one mesh position, unloaded and
+    under load.
 
     Unloaded it is that of modifications, misalignment and other meshes on the shafts, from where the flanks touch
     first; of helical gears where the pair is on the path of contact; on bent shafts the same with what the load of this
@@ -415,10 +416,8 @@ def face_gap(cycle: MeshCycle, mesh: Mesh, ax: Axes | None = None, *, position: 
         ax: Axes to draw into; None for a new figure.
         position: number of the mesh position; None for that with the largest line load.
     """
-    pair, where = _heaviest(cycle)
-    if position is not None:
-        where = position
-        pair = int(np.asarray(cycle.line_load)[:, :, where].max(axis=1).argmax())
+    where = _heaviest(cycle) if position is None else position
+    pair = int(np.asarray(cycle.pair_force)[:, where].argmax())
     unloaded, opening = (np.asarray(of)[pair, :, where] for of in (mesh.held(cycle.gap), cycle.opening))
     if cycle.kinematics.helical:
         beyond = np.asarray(cycle.kinematics.contact_outside)[pair, :, where] > 0
@@ -441,11 +440,9 @@ def face_gap(cycle: MeshCycle, mesh: Mesh, ax: Axes | None = None, *, position: 
     return ax
 
 
-def _heaviest(cycle: MeshCycle) -> tuple[int, int]:
-    """Pair and position with the largest line load."""
-    most = np.asarray(cycle.line_load).max(axis=1)
-    pair, where = np.unravel_index(int(most.argmax()), most.shape)
-    return int(pair), int(where)
+def _heaviest(cycle: MeshCycle) -> int:
+    """Position with the largest line load."""
+    return int(np.asarray(cycle.line_load).max(axis=(0, 1)).argmax())
 
 
 def _place(cycle: MeshCycle, pair: int, position: int) -> str:

@@ -187,7 +187,9 @@ def _over_face(file: DesignFile, mesh: Mesh, evaluations: Evaluations, torques: 
     if cycle.kinematics.helical:
         maps["plane_of_action"] = plot.plane_of_action(cycle)
     for drawn in maps.values():
-        np.ravel(drawn)[0].set_title(name, loc="left", fontsize=_TITLE)
+        first = np.ravel(drawn)[0]
+        over = {"pad": plot.figure.ABOVE_MARKS} if first.texts else {}
+        first.set_title(name, loc="left", fontsize=_TITLE, **over)
     lines = {"line_load": plot.line_load(cycle), "face_gap": plot.face_gap(cycle, mesh)}
     for drawn in lines.values():
         drawn.get_legend().set(title=name, alignment="left")
