@@ -124,7 +124,9 @@ def draw(found):
         for kind, design in (("unmodified", jnp.asarray([0.0, 1.0])), ("best relief", best)):
             cycles[f"{name}, {kind}"] = cycle(mesh, design)
     plot.save(plot.transmission_error(cycles).figure, "results/how_quiet_is_helical_te.png")
-    plot.save(plot.contact_pattern(cycles["helical, best relief"])[0].figure, "results/how_quiet_is_helical_pattern.png")
+    plot.save(
+        plot.contact_pattern(cycles["helical, best relief"])[0].figure, "results/how_quiet_is_helical_pattern.png"
+    )
     figure, ax = plt.subplots(figsize=(4.7, 3.0), layout="constrained")
     names = "unmodified", f"relief of {LIGHT[0]:g} µm", "best relief of 15 degrees"
     for name, values in zip(names, found["over_angles"].T):
