@@ -24,6 +24,7 @@ EXAMPLES = (
     "can_it_be_ground",
     "which_relief_lasts",
     "which_relief_for_one_speed",
+    "how_quiet_is_helical",
 )
 
 
@@ -42,7 +43,9 @@ def answers(name):
     return pytest.fixture(scope="module")(lambda: example(name).numbers(results(name)))
 
 
-relief, coupling, curve, robust, manufactured, driven, simulated, quiet, made, lasting, calm = map(answers, EXAMPLES)
+relief, coupling, curve, robust, manufactured, driven, simulated, quiet, made, lasting, calm, helical = map(
+    answers, EXAMPLES
+)
 
 
 @pytest.mark.parametrize("name", EXAMPLES)
@@ -258,3 +261,23 @@ def test_the_relief_that_lasts_is_the_better_one_over_the_life(lasting, pair, lo
     for name in ("unmodified", "when new", "over life"):
         assert lasting[f"{pair} {name}: uncertainty of the depth [um]"] < 0.02
         assert 1 < lasting[f"{pair} {name}: wear depth [um]"] < 10
+
+
+def test_a_helix_angle_and_a_relief_add_up(helical):
+    """Lines that enter the mesh one after the other halve the ripple; relief takes most of the rest of either pair."""
+    spur, oblique = helical["spur_unmodified_ppte_um"], helical["helical_unmodified_ppte_um"]
+    assert helical["overlap_ratio"] == pytest.approx(0.5492, abs=1e-4)
+    assert oblique < 0.5 * spur
+    assert helical["spur_best_ppte_um"] < 0.25 * spur and helical["helical_best_ppte_um"] < 0.25 * oblique
+    assert helical["helical_best_ppte_um"] < 0.5 * helical["spur_best_ppte_um"]
+    # one for lower loads leaves the spur pair as it is, and takes from a helical pair what its ends carried
+    assert helical["helical_light_relief_ppte_um"] > 1.1 * oblique
+    assert helical["spur_light_relief_ppte_um"] == pytest.approx(spur, rel=1e-6)
+
+
+def test_ripple_falls_with_the_overlap_from_that_of_the_spur_pair(helical):
+    found = results("how_quiet_is_helical")
+    unmodified = np.asarray(found["over_angles"])[:, 0]
+    assert float(found["overlap"][0]) == 0.0
+    assert unmodified[0] == pytest.approx(helical["spur_unmodified_ppte_um"], rel=0.02)
+    assert (np.diff(unmodified) < 0).all()

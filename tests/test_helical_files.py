@@ -1,16 +1,22 @@
 """Helical pairs in files: design files with both hands, slices and variables; REXS; commands."""
 
+import json
 from dataclasses import replace
 
 import jax
 import numpy as np
 import pytest
+from commands import call
 from design_texts import loaded, text
 from helical_pairs import pair_of
 
 import jaxgear as jg
-from jaxgear.io import DesignFileError, read_rexs, write_design, write_rexs
+from jaxgear.contact import helical_slices
+from jaxgear.io import DesignFileError, load_design, read_rexs, write_design, write_rexs
 from jaxgear.io.rexs.values import frames
+from jaxgear.io.write_design import write_starter
+from jaxgear.manufacture import span
+from jaxgear.studies.gear_data import gears
 
 ANGLE = "helix_angle = 15.0"
 OPEN = 'helix_angle = "beta"'
@@ -31,6 +37,18 @@ def test_one_gear_says_the_angle_of_both(load):
         pinion, wheel = load(**given).pair().gears
         assert float(pinion.helix_angle) == right == -float(wheel.helix_angle)
     assert load(pinion="helix_angle = 0.0").pair().is_spur and load().pair().is_spur
+
+
+def test_slices_show_the_contact_lines(load):
+    """Eleven, or ten for every base pitch of overlap; of variables those of the longest overlap."""
+    design = load(pinion=ANGLE)
+    assert design.resolution().slices == 11 == helical_slices(design.pair())
+    wide = "[resolution]\nslices = 7"
+    assert load(pinion=ANGLE, tail=wide).resolution().slices == 7
+    for low, high, slices in ((-5.0, 5.0, 11), (-40.0, 20.0, 13), (0.0, 45.0, 15)):
+        free = load(wheel=OPEN, tail=VARIABLE.format(low=low, high=high)).resolution()
+        assert (free.slices, free.pairs >= 4) == (slices, True)
+    assert load().resolution().slices == 1
 
 
 def test_the_angle_is_a_variable_of_both_gears(load):
@@ -189,3 +207,55 @@ def test_files_that_knew_no_tools_have_the_rack_of_iso_53(tmp_path, caplog):
     wanted = [jg.Gear(z, 1.0, 20.0, x, face_width=11.0, helix_angle=beta) for z, x, beta in
               ((23, 0.581, 30.0), (67, 0.5131, -30.0))]  # fmt: skip
     same(found, jg.GearPair(*wanted, 53.0))
+
+
+def test_the_tables_of_a_run_have_the_numbers_of_iso_21771(load):
+    """Values of the pair worked out by hand; W_k and M_dK are those of the library."""
+    wide = "[pair]\naxial_offset = 1.0"  # common face of 18 mm
+    found = gears(load(pinion=ANGLE, tail=wide))
+    pinion, pair = found["geometry"]["pinion"], found["geometry"]["pair"]
+    wanted = {"helix_angle_deg": 15.0, "base_helix_angle_deg": 14.0761, "transverse_module_mm": 3.105829}
+    wanted |= {"transverse_pressure_angle_deg": 20.646896}
+    for name, value in wanted.items():
+        assert float(pinion[name]) == pytest.approx(value, abs=6e-5), name
+    assert float(pair["center_distance_mm"]) == pytest.approx(104.04526, abs=5e-6)
+    assert float(pair["overlap_ratio"]) == pytest.approx(0.5492 * 18.0 / 20.0, abs=5e-5)
+    assert float(pair["total_contact_ratio"]) == pytest.approx(1.5700 + 0.5492 * 0.9, abs=1e-4)
+    teeth = found["drawing"]["wheel"]["teeth_spanned"]
+    wheel = load(pinion=ANGLE).pair().wheel
+    assert found["drawing"]["wheel"]["span_upper_limit_mm"] == pytest.approx(float(span(wheel, teeth)), rel=1e-12)
+
+
+def test_new_writes_a_helical_pair_that_is_read(tmp_path):
+    path = tmp_path / "new.toml"
+    given = {"module": 3.0, "torque": 100.0, "face_width": 20.0, "speed": None}
+    write_starter(path, (19, 48), **given, helix_angle=-15.0)
+    pair = load_design(path).pair()
+    assert float(pair.pinion.helix_angle) == -15.0 == -float(pair.wheel.helix_angle)
+    with pytest.raises(ValueError, match="helix_angle = 60 deg must be at least -45 deg and at most 45 deg"):
+        write_starter(tmp_path / "other.toml", (19, 48), **given, helix_angle=60.0)
+
+
+COMMAND = text(
+    pinion=ANGLE + "\n[[pinion.modification]]\ntype = 'tip_relief'\namount = 20.0\nlength = 5.0",
+    wheel="[[wheel.modification]]\ntype = 'tip_relief'\namount = 20.0\nlength = 5.0",
+    load="torque_range = [25.0, 50.0]\nspeed = 1000.0",
+    tail="[resolution]\npositions = 8\nslices = 5\npairs = 4\nnewton_steps = 12",
+)
+
+
+@pytest.mark.slow
+def test_analyze_takes_a_helical_file(tmp_path):
+    (tmp_path / "gear.toml").write_text(COMMAND)
+    found = call("analyze", tmp_path / "gear.toml", "--output", tmp_path / "out", "--report")
+    assert found.code == 0, found.err
+    data = json.loads((tmp_path / "out" / "summary.json").read_text())
+    designs = data["designs"]
+    assert designs["modified"]["overlap_ratio"] == pytest.approx(0.5492 * 0.9, abs=5e-5)
+    assert designs["modified"]["axial_force_N"] == pytest.approx(
+        50e3 / (1.5 * 19 / np.cos(np.deg2rad(15.0))) * np.tan(np.deg2rad(15.0)), rel=1e-6
+    )
+    assert data["resolution"]["slices"] == 5 and data["gears"]["wheel"]["helix_angle_deg"] == -15.0
+    for name in ("pressure_map", "contact_pattern", "line_load", "load_sharing", "pressure", "lead_chart"):
+        assert (tmp_path / "out" / f"{name}.png").stat().st_size > 5000
+    assert "overlap ratio" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
