@@ -114,8 +114,6 @@ def main(fast=False) -> dict:
 
 
 def draw(found):
-    import matplotlib.pyplot as plt
-
     from jaxgear import plot
 
     cycles = {}
@@ -127,13 +125,11 @@ def draw(found):
     plot.save(
         plot.contact_pattern(cycles["helical, best relief"])[0].figure, "results/how_quiet_is_helical_pattern.png"
     )
-    figure, ax = plt.subplots(figsize=(4.7, 3.0), layout="constrained")
     names = "unmodified", f"relief of {LIGHT[0]:g} µm", "best relief of 15 degrees"
-    for name, values in zip(names, found["over_angles"].T):
-        ax.plot(found["overlap"], values, label=name)
-    ax.set(xlabel="overlap ratio [-]", ylabel="peak-to-peak TE [µm]", ylim=(0, None))
-    ax.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, frameon=False, borderaxespad=0.2)
-    plot.save(figure, "results/how_quiet_is_helical_overlap.png")
+    ax = plot.ppte_over_overlap(
+        found["overlap"], dict(zip(names, found["over_angles"].T)), design=numbers(found)["overlap_ratio"]
+    )
+    plot.save(ax.figure, "results/how_quiet_is_helical_overlap.png")
 
 
 if __name__ == "__main__":
