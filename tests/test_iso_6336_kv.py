@@ -1,4 +1,4 @@
-"""K_v of ISO 6336-1, method B."""
+"""K_v, K_Halpha and K_Falpha of ISO 6336-1, method B."""
 
 import jax
 import jax.numpy as jnp
@@ -8,7 +8,13 @@ from helical_pairs import example, pair_of
 
 import jaxgear as jg
 from jaxgear.contact.status import Status
-from jaxgear.dynamics.iso_6336 import constants_of, factor_of, iso_dynamic_factor, resonance_speed
+from jaxgear.dynamics.iso_6336 import (
+    constants_of,
+    factor_of,
+    iso_dynamic_factor,
+    resonance_speed,
+    transverse_load_factors,
+)
 from jaxgear.tolerance import ToleranceClass
 
 
@@ -116,6 +122,32 @@ def test_a_small_angle_has_the_factor_of_spur_gears():
         for beta in (None, 1e-6, 0.1, 15.0)
     )
     assert nearly == pytest.approx(spur, rel=1e-6) and small == pytest.approx(spur, rel=1e-5) and 1 < large < spur
+
+
+def test_transverse_load_factors_of_the_worked_example():
+    """ISO/TR 6336-30, example 1, prints 1 for both; coarser gears have more, up to one pair that carries all."""
+    printed, rough, worst = (
+        transverse_load_factors(example(), 9000.0, quality_class=of, dynamic_factor=1.003, face_load_factor=1.16)
+        for of in (5, 10, 11)
+    )
+    assert float(printed.contact) == float(printed.root) == 1.0
+    base = 0.925 * float(ToleranceClass.of(example().wheel, 10).single_pitch) * np.cos(np.deg2rad(20.71975))
+    moved = 17.46485 * base / (1273.524 * 1.003 * 1.16)
+    by_hand = 0.9 + 0.4 * np.sqrt(2 * 1.632459 / 2.632459) * moved
+    assert float(rough.contact) == float(rough.root) == pytest.approx(by_hand, rel=1e-4) and by_hand > 1.05
+    light = transverse_load_factors(example(), 500.0, quality_class=11)
+    assert float(worst.contact) > float(rough.contact)
+    assert float(light.contact) == pytest.approx(2.632459, rel=1e-5)  # Z_eps^2 = 1 / eps_alpha
+    assert float(light.root) == pytest.approx(2.632459 / (0.25 * 1.549090 + 0.75), rel=1e-5)
+
+
+def test_transverse_load_factors_of_spur_gears_and_across_a_total_contact_ratio_of_two():
+    spur, nearly = (float(transverse_load_factors(pair_of(b), 150.0, quality_class=9).contact) for b in (None, 1e-6))
+    assert nearly == pytest.approx(spur, rel=1e-6) and spur > 1.05
+    below, above = (pair_of(15.0, width) for width in (15.655, 15.658))  # eps_beta 0.43
+    load = {"quality_class": 9, "torque": 150.0}
+    factors = [float(transverse_load_factors(each, **load).contact) for each in (below, above)]
+    assert factors[1] == pytest.approx(factors[0], rel=2e-4)
 
 
 def test_slow_gears_are_told(pair):

@@ -1,4 +1,5 @@
-"""Dynamic factor K_v of ISO 6336-1, method B: what the standard expects, beside what the dynamics find."""
+"""Dynamic factor K_v of ISO 6336-1, method B: what the standard expects, beside what the dynamics find; and the
+transverse load factors K_Halpha and K_Falpha, which rest on it."""
 
 import jax.numpy as jnp
 from jaxtyping import Array, Float
@@ -6,6 +7,7 @@ from jaxtyping import Array, Float
 from ..compliance import IsoStiffness, iso_stiffness
 from ..contact.status import Status, Statuses, status_of
 from ..geometry import Gear, GearPair, path_of_contact
+from ..metrics.stress import contact_factor_squares
 from ..numerics import Checked, Given, check, optional_real, program, real, result
 from ..tolerance import ToleranceClass
 
@@ -116,6 +118,58 @@ def iso_dynamic_factor(
     )
 
 
+class TransverseLoadFactors(Checked):
+    """How unevenly pairs share the load for their base pitch deviations, by ISO 6336-1, method B.
+
+    Attributes:
+        contact: K_Halpha.
+        root: K_Falpha.
+    """
+
+    contact: Scalar = result()
+    root: Scalar = result()
+
+
+def transverse_load_factors(
+    pair: GearPair,
+    torque: Given,
+    *,
+    quality_class: Given,
+    dynamic_factor: Given = 1.0,
+    face_load_factor: Given = 1.0,
+    application_factor: Given = 1.0,
+    run_in: Given = _RUN_IN,
+) -> TransverseLoadFactors:
+    """K_Halpha and K_Falpha of a gear pair.
+
+    0.9 + 0.4 c_gamma_alpha (f_pb - y_alpha) / (F_tH / b), F_tH = F_t K_A K_v K_Hbeta; of total contact ratios
+    eps_gamma up to 2 times eps_gamma / 2, above it with a second term times sqrt(2 (eps_gamma - 1) / eps_gamma). At
+    least 1; at most eps_gamma / (eps_alpha Z_eps^2) and eps_gamma / (0.25 eps_alpha + 0.75), one pair that carries all.
+    Equations (73) to (76) of the edition of 2006, from the source of `IsoDynamicFactor`.
+
+    Args:
+        pair: gear pair.
+        torque: on the pinion, more than 0 [N m].
+        quality_class, application_factor, run_in: as of `iso_dynamic_factor`.
+        dynamic_factor: K_v.
+        face_load_factor: K_Hbeta.
+    """
+    owner = "transverse_load_factors"
+    check(owner, "torque", torque, "N m", low=0.0, open_low=True)
+    check(owner, "dynamic_factor", dynamic_factor, "", low=0.0, open_low=True)
+    check(owner, "face_load_factor", face_load_factor, "", low=0.0, open_low=True)
+    check(owner, "application_factor", application_factor, "", low=0.0, open_low=True)
+    check(owner, "run_in", run_in, "", low=0.0, high=1.0)
+    load = _line_load(pair, real(torque), real(application_factor))
+    deviation = _deviations(pair, quality_class)[0] * (1 - real(run_in))
+    moved = iso_stiffness(pair, load).mesh * deviation / (load * real(dynamic_factor) * real(face_load_factor))
+    along, total = path_of_contact(pair).contact_ratio, _total_contact_ratio(pair)
+    above = jnp.maximum(total, 2.0)
+    factor = (0.9 + 0.4 * jnp.sqrt(2 * (above - 1) / above) * moved) * jnp.minimum(total, 2.0) / 2
+    limits = along * contact_factor_squares(pair).contact_ratio, 0.25 * along + 0.75
+    return TransverseLoadFactors(*(jnp.clip(factor, 1.0, total / limit) for limit in limits))
+
+
 def resonance_speed(teeth: Given, mesh_stiffness: Given, reduced_mass: Given) -> Scalar:
     """n_E1 = 30000 / (pi z_1) sqrt(c_gamma_alpha / m_red) [rpm], where teeth come in at the natural frequency.
 
@@ -176,10 +230,19 @@ def _deviations(pair: GearPair, quality_class) -> tuple[Scalar, Scalar]:
     return jnp.maximum(*base), jnp.maximum(*(limits.profile_form for _, limits in gears))
 
 
+def _line_load(pair: GearPair, torque: Scalar, application: Scalar) -> Scalar:
+    """K_A F_t / b [N/mm]."""
+    return 1e3 * torque * application / pair.pinion.pitch_radius / pair.face_width
+
+
+def _total_contact_ratio(pair: GearPair) -> Scalar:
+    return path_of_contact(pair).contact_ratio + pair.overlap_ratio
+
+
 @program
 def _factor(pair, torque, speed, tip_relief, application, run_in, pitch, form, mass) -> IsoDynamicFactor:
     pinion = pair.pinion
-    load = 1e3 * torque * application / pinion.pitch_radius / pair.face_width
+    load = _line_load(pair, torque, application)
     stiffness: IsoStiffness = iso_stiffness(pair, load)
     mass = _reduced_mass(pair) if mass is None else mass
     resonance = resonance_speed(pinion.teeth, stiffness.mesh, mass)
@@ -191,7 +254,7 @@ def _factor(pair, torque, speed, tip_relief, application, run_in, pitch, form, m
     )
     ratio = speed / resonance
     begins = jnp.where(load >= 100, 0.85, 0.5 + 0.35 * jnp.sqrt(jnp.minimum(load, 100.0) / 100))
-    constants = constants_of(path_of_contact(pair).contact_ratio + pair.overlap_ratio)
+    constants = constants_of(_total_contact_ratio(pair))
     pitch_line = 2 * jnp.pi * pinion.pitch_radius * _MM * speed / 60
     u = pair.gear_ratio
     usable = pitch_line * pinion.teeth / 100 * u / jnp.sqrt(1 + u**2)
