@@ -11,6 +11,7 @@ from helical_pairs import SIZES, TORQUE, pair_of
 
 import jaxgear as jg
 from jaxgear.contact.status import Status
+from jaxgear.layout import at_stations, level_load
 from jaxgear.shafts import (
     Bearing,
     Coupling,
@@ -20,6 +21,7 @@ from jaxgear.shafts import (
     Section,
     Shaft,
     ShaftLoad,
+    annex_e,
     bearing_reactions,
     support,
 )
@@ -130,6 +132,23 @@ def test_mirrored_gearboxes_turn_their_influence_round():
     np.testing.assert_allclose(turned.influence(Y), influence, rtol=1e-9)
     assert float(turned.pair.pinion.helix_angle) == BETA
     assert np.abs(support(gearbox(pair=left)).influence(Y) - influence).max() > 0.01 * influence.max()
+
+
+def test_flank_lines_level_helical_gears_on_shafts():
+    """Of a mirrored gearbox the slope changes sign; the hand alone changes what the moments tilt."""
+
+    def levelled(beta, mirrored):
+        box = gearbox(pair=pair_of(beta, 18.0), mirrored=mirrored, torque=TORQUE)
+        face = at_stations(support(box), stations=21)
+        line = level_load(face)
+        load = [annex_e(face, face.torque, wheel=each, stations=21) for each in (None, line.modification)]
+        factors = [float(one.face_load_factor) for one in load]
+        assert factors[1] < 1.02 < factors[0]
+        return np.array([line.slope, line.crowning])
+
+    right, mirrored, left = levelled(BETA, False), levelled(-BETA, True), levelled(-BETA, False)
+    np.testing.assert_allclose(mirrored, right * [-1, 1], rtol=1e-6)
+    assert np.abs(left - right).max() > 1.0
 
 
 def supported(pair, slope=4.0, **given):

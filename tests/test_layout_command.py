@@ -130,6 +130,34 @@ def test_the_command_compares_with_rigid_seats(file, tmp_path):
     assert not any(np.any(each["seat_um"]) for each in found["bearings"]["rigid seats"].values())
 
 
+HELICAL = FILE.replace("[pinion]", "[pinion]\nhelix_angle = 15.0").replace("tip_diameter = 63.0\n", "")
+HELICAL = HELICAL.replace("tip_diameter = 150.0\n", "").replace("pairs = 2", "pairs = 4")
+
+
+@pytest.mark.slow
+def test_the_command_lays_out_helical_pairs(file, tmp_path):
+    done = call("layout", str(file(HELICAL + PROFILE)), "--output", str(tmp_path / "out"), "--quick")
+    assert done.code == 0, done.err
+    found = json.loads((tmp_path / "out" / "summary.json").read_text())
+    main = found["layouts"]["rigid seats"]
+    assert main["face_load_factor"]["step_1"] < main["face_load_factor"]["unmodified"]
+    force = {name: each["force_N"][2] for name, each in found["bearings"]["rigid seats"].items()}
+    axial = 2e3 * 150.0 * np.sin(np.deg2rad(15.0)) / (3.0 * 19)  # to positive z: right hand, counterclockwise
+    np.testing.assert_allclose([force[name] for name in "ABCD"], [axial, 0.0, -axial, 0.0], atol=1e-3)
+    (ratio,) = {each["contact_ratio"] for each in found["profiles"].values()}
+    assert ratio == pytest.approx(1.570 + 18.0 / 20.0 * 0.5492, abs=1e-3)  # with overlap
+
+
+def test_a_helical_pinion_turns_counterclockwise(file):
+    text = HELICAL.replace("[layout]", '[layout]\ndirection = "clockwise"')
+    with pytest.raises(ValueError, match="layout.direction: makes the helical pinion turn clockwise") as refused:
+        load_design(file(text))
+    assert len(str(refused.value).splitlines()) == 1
+    loose = HELICAL.replace(", axial = 80.0", "")
+    with pytest.raises(ValueError, match='axial force of gear "pinion" needs a bearing of axial stiffness'):
+        load_design(file(loose))
+
+
 def laid_out(path, folder, *quick):
     """Summary and output of the command, after what holds with and without a housing."""
     done = call("layout", str(path), "--output", str(folder), "--report", *quick)

@@ -37,6 +37,8 @@ RESULTS = (
     "root_face_load_factor",
     "edge_load_factor",
 )
+# Of helical pairs, whose slices meet at phases of their own: pairs that are loaded anywhere on the face tell no shock.
+_HELICAL = ("corner_contact_length",)
 # By so much the effective contact ratio may be above the theoretical one: positions resolve ends of contact to less.
 _SHOCK = 0.01
 AMOUNTS = "pinion_amount", "wheel_amount"
@@ -54,7 +56,9 @@ class ProfileLayout:
         table: a row per variant; the first has neither a profile modification nor a further slope or crowning, the
             others are all combinations, later ones running fastest: pinion, wheel, slope, crowning.
         best: number of the variant that was chosen.
-        contact_ratio: theoretical one.
+        contact_ratio: theoretical one, with the overlap of helical pairs.
+        shock: of every variant, contact beyond the theoretical path of contact in base pitches: effective less
+            theoretical contact ratio, of helical pairs of the slice with the most.
         profiles: modifications of pinion and wheel of the variant that was chosen, without the flank lines; that of the
             wheel has the further slope and crowning where they were varied.
     """
@@ -63,6 +67,7 @@ class ProfileLayout:
     table: SweepTable
     best: int
     contact_ratio: float
+    shock: Float[np.ndarray, " variants"]
     profiles: tuple[AbstractModification, AbstractModification]
 
     @property
@@ -80,7 +85,7 @@ class ProfileLayout:
     @property
     def without_shock(self) -> np.ndarray:
         """Whether the teeth of every variant meet on the theoretical path of contact only."""
-        return self.table.column("effective_contact_ratio") <= self.contact_ratio + _SHOCK
+        return self.shock <= _SHOCK
 
     def change(self, name: str) -> float:
         """Of a result from no profile modification to the variant that was chosen, relative [%]."""
@@ -156,17 +161,26 @@ def vary_profiles(
     length = real(long_relief_length(mesh.pair) if length is None else length)
     design = _Crossed(flank_lines, _Profile(kind, length, curve), mesh.pair)
     rows = [(0.0,) * len(_VARIABLES), *itertools.product(*crossed.values())]
-    wanted = (*RESULTS, *(one for one in results if one not in RESULTS))
+    own = _results(mesh.pair)
+    wanted = (*own, *(one for one in results if one not in own))
     plan = VariantList(_VARIABLES, rows)
     given: dict[str, Any] = {"mesh": mesh, "torque": torque, "results": wanted, "units": _UNITS}
     table = sweep(design, plan, output=output, callback=callback, title="profile modifications", **given)
-    theoretical = float(path_of_contact(mesh.pair).contact_ratio)
-    best = _best(table, theoretical)
+    theoretical = float(path_of_contact(mesh.pair).contact_ratio + mesh.pair.overlap_ratio)
+    if mesh.pair.is_spur:
+        shock = table.column("effective_contact_ratio") - theoretical
+    else:
+        shock = table.column(*_HELICAL) / float(mesh.pair.base_pitch)
+    best = _best(table.column("ppte"), shock)
     first, second, slope, crowning = rows[best]
     on_pinion, on_wheel = (design.profile(real(amount)) for amount in (first, second))
     if slope or crowning:
         on_wheel = FlankLine(real(slope), real(crowning)).on(mesh.pair, "wheel").modification + on_wheel
-    return ProfileLayout(kind, table, best, theoretical, (on_pinion, on_wheel))
+    return ProfileLayout(kind, table, best, theoretical, shock, (on_pinion, on_wheel))
+
+
+def _results(pair: GearPair) -> tuple[str, ...]:
+    return RESULTS if pair.is_spur else (*RESULTS, *_HELICAL)
 
 
 def flank_line_contact(
@@ -177,7 +191,9 @@ def flank_line_contact(
     deviations: Iterable[Given] = (0.0,),
     kind: Kind = "tip_relief",
 ) -> dict[str, Float[np.ndarray, " deviations"]]:
-    """What the loaded tooth contact says of flank lines without profile modifications: `RESULTS`, NaN where it fails.
+    """What the loaded tooth contact says of flank lines without profile modifications, NaN where it fails.
+
+    `RESULTS`, and of helical pairs the length of contact of tip corners.
 
     Args:
         mesh, torque: as for `vary_profiles`, whose compiled program serves here.
@@ -188,7 +204,7 @@ def flank_line_contact(
     """
     design = _Crossed(flank_lines, _Profile(kind, real(long_relief_length(mesh.pair)), None), mesh.pair)
     plan = VariantList(_VARIABLES, [(0.0, 0.0, float(slope), 0.0) for slope in deviations])
-    table = sweep(design, plan, mesh=mesh, torque=torque, results=RESULTS, units=_UNITS)
+    table = sweep(design, plan, mesh=mesh, torque=torque, results=_results(mesh.pair), units=_UNITS)
     return {name: table.column(name) for name in table.results}
 
 
@@ -218,10 +234,9 @@ class _Crossed(eqx.Module):
         return pinion, wheel + further.modification
 
 
-def _best(table: SweepTable, theoretical: float) -> int:
+def _best(ppte: Float[np.ndarray, " variants"], shock: Float[np.ndarray, " variants"]) -> int:
     """The least transmission error without contact shock; with the least shock where all have some."""
-    ppte, ratio = table.column("ppte"), table.column("effective_contact_ratio")
     if not np.isfinite(ppte).any():
         raise ValueError("vary_profiles: the contact of every variant failed")
-    free = ratio <= theoretical + _SHOCK
-    return int(np.nanargmin(np.where(free, ppte, np.nan) if free.any() else ratio))
+    free = shock <= _SHOCK
+    return int(np.nanargmin(np.where(free, ppte, np.nan) if free.any() else shock))
