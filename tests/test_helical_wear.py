@@ -2,6 +2,7 @@
 
 from functools import cache
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from helical_pairs import SIZES, TORQUE, pair_of, solved
 
 import jaxgear as jg
 from jaxgear import wear
+from jaxgear.dynamics import Dynamics, natural_frequencies
 from jaxgear.wear.worn_volume import deposit, worn
 
 POINTS, COEFFICIENT = 17, 1e-18
@@ -98,3 +100,28 @@ def test_the_flanks_of_a_life_give_its_mesh_again():
     again = jg.solve(solved()[0], TORQUE, pinion=pinion, wheel=wheel)
     np.testing.assert_allclose(again.transmission_error, life.cycles.transmission_error[-1], atol=1e-3)
     assert np.abs(again.transmission_error - life.cycles.transmission_error[0]).max() > 0.1
+
+
+@pytest.mark.slow
+def test_slow_gears_wear_as_under_the_static_load():
+    settings = Dynamics([1.0], damping_ratio=0.1, model="varying stiffness", positions=16, steps=256)
+    mesh = jg.prepare(pair_of(tooth_thickness_allowance=-40.0), resolution=SIZES)
+    given = {"coefficient": COEFFICIENT, "blocks": 2, "points": POINTS}
+    frequency = float(natural_frequencies(settings.oscillator(mesh, TORQUE)).mesh) / 40
+    load = jg.OperatingPoint(TORQUE, 60 * frequency / 19)
+    slow, static = wear.wear(mesh, load, 2e6, dynamics=settings, **given), wear.wear(mesh, TORQUE, 2e6, **given)
+    assert slow.converged.all() and 1.0 < float(slow.dynamic_factor[0]) < 1.1
+    np.testing.assert_allclose(slow.depth, static.depth, atol=0.01 * float(wear.wear_depth(static)[-1]))
+
+
+@pytest.mark.slow
+def test_derivatives_by_angle_and_coefficient_are_central_differences():
+    def lost(x):
+        mesh = jg.prepare(pair_of(x[0]), resolution=SIZES)
+        given = {"coefficient": 1e-18 * x[1], "blocks": 2, "points": POINTS, "pinion": jg.LeadCrowning(5.0)}
+        return wear.worn_volume(wear.wear(mesh, TORQUE, 1e5, **given))[-1].sum()
+
+    # the contact is solved to 1e-10 of the volume, which depends little on the angle: smaller steps show that
+    at, step, value = jnp.array([15.0, 1.3]), 1e-2, jax.jit(lost)
+    wanted = [(value(at + each) - value(at - each)) / (2 * step) for each in step * jnp.eye(2)]
+    np.testing.assert_allclose(jax.jit(jax.jacfwd(lost))(at), wanted, rtol=3e-5)
