@@ -101,7 +101,12 @@ def test_solution_meets_the_conditions():
     deflected = np.einsum("psn,pjn,st,jtn,jtn->psn", scale, mesh.structure, kernel, scale, load)
     approach = np.asarray(cycle.transmission_error) - float(mesh.hub * cycle.force / mesh.pair.face_width)
     law = np.asarray(mesh.law.deflection(jnp.asarray(load)))
-    left = deflected + law + np.asarray(cycle.gap) - np.asarray(mesh.lever) * approach
+    force = np.asarray(mesh.lever * load).sum(axis=0)
+    bends, tilt = np.asarray(mesh.coupling.support_modes), np.asarray(mesh.coupling.support)
+    tilted = bends @ tilt @ bends.T @ force
+    assert np.abs(tilted).max() > 1e-3 and bends.shape == (5, 2)  # um
+    np.testing.assert_allclose(tilt, [[0.0, tilt[1, 0]], [tilt[1, 0], 0.0]], atol=1e-12)
+    left = deflected + np.asarray(mesh.lever) * tilted + law + np.asarray(cycle.gap) - np.asarray(mesh.lever) * approach
     assert left.min() > -1e-8 and np.abs(left[load > 0]).max() < 1e-8
     assert (load > 0).any(axis=1).sum(axis=0).max() >= 2  # pairs share the load
     assert str(cycle).splitlines()[-1].split() == ["overlap", "ratio", "0.549"]
@@ -154,16 +159,19 @@ def test_harmonics_of_a_constant_stiffness(width, beta):
     np.testing.assert_allclose(found, wanted, atol=0.01)
 
 
-# Three-dimensional finite elements of whole gears, 16 slices, mean TE and PPTE [um] and the largest over the mean line
-# load, summed over the pairs and averaged over the cycle; bore of the wheel [mm], torque [N m]
+# Three-dimensional finite elements of whole gears, 16 slices, contacts at their nominal place: mean TE and PPTE [um] and
+# the largest over the mean line load, summed over the pairs and averaged over the cycle; bore of the wheel [mm], torque
 REFERENCE = {
     ("unmodified", 40.0, 150.0): (22.2682, 2.7279, 1.0705),
     ("unmodified", 100.0, 150.0): (16.3957, 2.5887, 1.0240),
     ("crowning", 40.0, 150.0): (25.4173, 3.4190, 1.5127),
     ("crowning", 100.0, 50.0): (8.2040, 2.2927, 2.1973),
+    ("slope", 40.0, 150.0): (22.3329, 3.4133, 1.8535),
+    ("other slope", 40.0, 150.0): (21.9251, 3.8403, 1.9469),
     ("slope", 100.0, 50.0): (3.9505, 3.1332, 3.5000),
     ("slope", 100.0, 150.0): (16.2304, 3.5690, 1.9349),
     ("other slope", 100.0, 150.0): (16.2576, 3.6838, 1.9250),
+    ("relief", 40.0, 50.0): (8.9105, 0.9075, 1.0557),
     ("relief", 100.0, 150.0): (18.1351, 2.6769, 1.0301),
 }
 FLANKS = {"crowning": jg.LeadCrowning(10.0), "slope": jg.LeadSlope(20.0), "other slope": jg.LeadSlope(-20.0)}
@@ -172,33 +180,43 @@ FLANKS = {"crowning": jg.LeadCrowning(10.0), "slope": jg.LeadSlope(20.0), "other
 @pytest.mark.slow
 def test_whole_gears_in_finite_elements():
     meshes = {
-        bore: jg.prepare(pair_of(bores=(20.0, bore)), resolution=replace(SIZES, positions=32, slices=15))
+        bore: jg.prepare(pair_of(bores=(20.0, bore)), resolution=replace(SIZES, positions=32, slices=16, slide_steps=0))
         for bore in (40.0, 100.0)
     }
     for (kind, bore, torque), (mean, ripple, factor) in REFERENCE.items():
         mesh, both = meshes[bore], {"pinion": FLANKS.get(kind), "wheel": None}
         if kind == "relief":
             addendum = [side.tip_roll_length - side.pitch_roll_length for side in mesh.sides]
-            both = {name: jg.TipRelief(8.0, 0.4 * length) for name, length in zip(both, addendum)}
+            both = {name: jg.TipRelief(8.0, 0.4 * length, jg.Linear()) for name, length in zip(both, addendum)}
         cycle = jg.solve(mesh, torque, **both)
         error, load = np.asarray(cycle.transmission_error), np.asarray(cycle.line_load).sum(axis=0).mean(axis=-1)
         assert bool(cycle.converged.all())
         assert error.mean() == pytest.approx(mean, rel=0.03), (kind, bore)
-        assert np.ptp(error) == pytest.approx(ripple, rel=0.10), (kind, bore)
-        assert load.max() / load.mean() == pytest.approx(factor, rel=0.06), (kind, bore)
+        assert np.ptp(error) == pytest.approx(ripple, rel=0.07, abs=0.1), (kind, bore)
+        assert load.max() / load.mean() == pytest.approx(factor, rel=0.05), (kind, bore)
 
 
 def test_the_body_tilts_under_the_axial_force():
     """Half the width makes a plate eight times as soft, but for shear; a wheel that is held far out hardly yields."""
     gears = [jg.Gear(48, 3.0, face_width=b, helix_angle=15.0, bore_diameter=40.0) for b in (5.0, 10.0)]
-    thin, thick = map(float, map(axial_compliance, gears))
+    thin, thick = (float(axial_compliance(gear).deflection) for gear in gears)
     assert 7.0 < thin / thick < 8.0
-    assert float(axial_compliance(pair_of().wheel)) < 0.3 * float(axial_compliance(pair_of(bores=(20.0, 40.0)).wheel))
+    held_far_out, held_far_in = (axial_compliance(pair_of(bores=(20.0, bore)).wheel) for bore in (100.0, 40.0))
+    assert float(held_far_out.deflection) < 0.3 * float(held_far_in.deflection)
     # without the tilt, of the ring alone: the same torsion as that of a spur gear of these radii
     twisted = float(solved()[0].hub) - 20.0 * float(jnp.tan(pair_of().pinion.base_helix_angle)) ** 2 * sum(
-        float(axial_compliance(gear)) for gear in pair_of().gears
+        float(axial_compliance(gear).deflection) for gear in pair_of().gears
     )
     assert 0 < twisted < float(solved()[0].hub)
+
+
+def test_a_narrow_body_bends_as_a_cantilever():
+    """Of every harmonic that is longer than the ring is high: w = F l^3 / 3 D, w' = F l^2 / 2 D."""
+    gear = jg.Gear(400, 1.0, face_width=0.2, helix_angle=15.0, bore_diameter=407.0)
+    length = float(gear.pitch_radius - gear.bore_radius)
+    found = axial_compliance(gear)
+    assert 0.0 < length < 0.02 * float(gear.pitch_radius)
+    assert float(found.slope * length / found.deflection) == pytest.approx(1.5, rel=0.02)
 
 
 @pytest.mark.slow
@@ -218,13 +236,13 @@ def test_derivatives_by_angle_and_width_are_central_differences():
 def test_flanks_are_found_by_gradients():
     mesh = solved()[0]
     found = jg.optimize.minimize(
-        lambda x: (jg.TipRelief(x["amount"], 2.7), jg.TipRelief(x["amount"], 3.0)),
+        lambda x: (jg.TipRelief(x["amount"], 5.0), jg.TipRelief(x["amount"], 5.0)),
         {"amount": (0.0, 20.0)},
         mesh=mesh,
         torque=TORQUE,
     )
     finer = jg.solve(jg.prepare(mesh.pair, resolution=replace(SIZES, positions=512)), TORQUE)
-    assert float(found.objective) < float(jg.peak_to_peak(finer.transmission_error))
+    assert float(found.objective) < 0.5 * float(jg.peak_to_peak(finer.transmission_error))
 
 
 def test_gears_must_have_opposite_hands():

@@ -61,6 +61,12 @@ class AbstractCompliance(eqx.Module):
     def hub(self, pinion: ToothLoad, wheel: ToothLoad) -> Float[Array, "gears"]:
         """Wind-up of the bodies of pinion and wheel, in um per N/mm of total line load over their own faces."""
 
+    def slope(self, pinion: ToothLoad, wheel: ToothLoad) -> Float[Array, "gears"]:
+        """Of both bodies at the rim in the direction of the radius under an axial force there [um/N per mm]; zero
+        where they are taken not to turn.
+        """
+        return jnp.zeros((2,), pinion.roll_length.dtype)
+
     @abstractmethod
     def law(
         self,
@@ -128,6 +134,9 @@ class Compliance(AbstractCompliance):
     def hub(self, pinion: ToothLoad, wheel: ToothLoad) -> Float[Array, "gears"]:
         return jnp.stack([self.body.hub(pinion.outline), self.body.hub(wheel.outline)])
 
+    def slope(self, pinion: ToothLoad, wheel: ToothLoad) -> Float[Array, "gears"]:
+        return jnp.stack([self.body.slope(pinion.outline), self.body.slope(wheel.outline)])
+
     def law(self, geometry: ContactGeometry, pinion: ToothLoad, wheel: ToothLoad, outside: Outside) -> AbstractSpring:
         law = self.contact.prepare(geometry)
         if not self.edge_softening:
@@ -147,6 +156,9 @@ class _OfGears(AbstractCompliance):
 
     def hub(self, pinion: ToothLoad, wheel: ToothLoad) -> Float[Array, "gears"]:
         return self.model.hub(pinion, wheel)
+
+    def slope(self, pinion: ToothLoad, wheel: ToothLoad) -> Float[Array, "gears"]:
+        return self.model.slope(pinion, wheel)
 
     def law(self, geometry: ContactGeometry, pinion: ToothLoad, wheel: ToothLoad, outside: Outside) -> AbstractSpring:
         return self.model.law(geometry, pinion, wheel, outside)

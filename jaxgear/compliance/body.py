@@ -75,6 +75,10 @@ class AbstractBody(Checked):
         )
         return first, second
 
+    def slope(self, outline: Outline) -> Float[Array, ""]:
+        """Of the body at its rim in the direction of the radius under an axial force there [um/N per mm]."""
+        return jnp.zeros_like(outline.gear.base_radius)
+
     @abstractmethod
     def hub(self, outline: Outline) -> Float[Array, ""]:
         """What all teeth share: rotation of the root circle against the bore, and of helical gears the axial deflection
@@ -155,8 +159,15 @@ class ElasticRing(AbstractBody):
         torsion = (1 + material.poisson_ratio) * (ratio**2 - 1) / (2 * jnp.pi * material.elastic_modulus)
         value = 1e3 * torsion * (gear.base_radius / gear.root_circle_radius) ** 2
         if gear.helix_angle is not None:
-            value = value + axial_compliance(gear) * gear.face_width * jnp.tan(gear.base_helix_angle) ** 2
+            axial = axial_compliance(gear).deflection
+            value = value + axial * gear.face_width * jnp.tan(gear.base_helix_angle) ** 2
         return value if self.hub_windup else jnp.zeros_like(value)
+
+    def slope(self, outline: Outline) -> Float[Array, ""]:
+        gear = outline.gear
+        if gear.helix_angle is None or not self.hub_windup:
+            return super().slope(outline)
+        return axial_compliance(gear).slope
 
 
 class Sainsot(AbstractBody):

@@ -166,7 +166,11 @@ class Mesh(eqx.Module):
         return gap if self.support_gap is None else gap + over_slices(self.lever) * self.support_gap[None, :, None]
 
     def support_deflection(self, line_load: Float[Array, "pairs slices positions"]) -> Float[Array, " positions"]:
-        """Transmission error by deflection of the support, alike for all pairs, under line loads [N/mm], in um."""
+        """Transmission error by deflection of shafts and tilt of the bodies, alike for all pairs [um].
+
+        Args:
+            line_load: of all pairs [N/mm].
+        """
         bent = None if self.coupling is None else self.coupling.support_deflection(self.lever, list(line_load))
         return jnp.zeros_like(line_load[0, 0]) if bent is None else jnp.min(bent, axis=0)
 
@@ -323,7 +327,7 @@ def _arrays_of(
         width_factor=width_factor,
         hub=jnp.sum(hubs),
         slice_width=moving.slice_width,
-        coupling=coupling_of(moving, spreading, structures[1], scale, support),
+        coupling=coupling_of(moving, spreading, structures[1], scale, support, compliance.slope(pinion, wheel)),
         support=support,
         support_gap=None if support is None else support.gap(moving.face_coordinate).astype(moving.slice_width.dtype),
         support_torque=None if support is None else support.torque,
