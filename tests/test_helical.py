@@ -159,8 +159,8 @@ def test_harmonics_of_a_constant_stiffness(width, beta):
     np.testing.assert_allclose(found, wanted, atol=0.01)
 
 
-# Three-dimensional finite elements of whole gears, 16 slices, contacts at their nominal place: mean TE and PPTE [um] and
-# the largest over the mean line load, summed over the pairs and averaged over the cycle; bore of the wheel [mm], torque
+# Three-dimensional finite elements of whole gears, 16 slices, contacts at their nominal place: mean TE and PPTE [um],
+# largest over mean line load, summed over the pairs and averaged over the cycle; bore of the wheel [mm], torque [N m]
 REFERENCE = {
     ("unmodified", 40.0, 150.0): (22.2682, 2.7279, 1.0705),
     ("unmodified", 100.0, 150.0): (16.3957, 2.5887, 1.0240),

@@ -8,11 +8,10 @@ flow has a harmonic potential. Against finite elements of whole gears (19/48 tee
 mm) the mean transmission error of unmodified gears is within 2 %, with the wheel held at 40 mm or at 100 mm; without
 the plate it is up to 14 % too small.
 
-Where the body turns with its rim, the place of a contact on the face counts too: at y from the middle of the body the
-radial part of the force, sin(alpha_wt), works on the slope, and where the force lies acts back on the deflection of
-all. `tilt` is this: small, but it shares the load unevenly over the face, and moves the transmission error as the load
-moves from one end to the other. Slopes of 20 um either way then miss the mean transmission error by 3 % in place of 5,
-and line loads by a third of what they did.
+The body also turns with its rim, so that the place of a contact on the face counts: at y from the middle of the body
+the radial part of the force, sin(alpha_wt), works on the slope, and the load's own place acts back on the deflection of
+all (`contact.face_coupling`). With a wheel held at 40 mm, mean transmission errors of gears with a slope of 20 um are
+up to 5 % off without that, 2 % with it, and line loads of unmodified gears 3 % and 1 % (rms).
 
 References:
     S. Timoshenko, S. Woinowsky-Krieger, Theory of Plates and Shells, 1959, section 63 (loads that are not symmetric).

@@ -133,8 +133,7 @@ def coupling_of(
         coupling = replace(coupling, other=Other(wheel, shares[1] - shares[0], rests[1] - rests[0]))
     if support is None and not moving.helical:
         return coupling
-    influence = _tilt(moving, slopes) if moving.helical else 0.0
-    bends = jnp.asarray(_polynomials(sizes), kernels.dtype)
+    bends, influence = jnp.asarray(_polynomials(sizes), kernels.dtype), _tilt(moving, slopes)
     if support is None:
         bends = bends[:, :2]
     else:
@@ -150,12 +149,14 @@ def coupling_of(
 def _tilt(moving: Kinematics, slopes: Float[Array, "gears"]) -> Float[Array, "slices slices"]:
     """What the slope of helical bodies adds to the deflection at one place of the face under a force at another [um/N].
 
-    Contacts at y from the middle of a body move by y times the slope along the radius, sin(alpha_wt) of which counts on the line
-    of action, where the axial force is tan(beta_b) times that along it; and the other way round. The axial force turns
-    both bodies the same way, so that their slopes are subtracted. The part of y y' alone, which spur gears have too, is
-    left out: it is less than a hundredth of the compliance.
+    Contacts at y from the middle of a body move by y times the slope along the radius, sin(alpha_wt) of which counts on
+    the line of action, where the axial force is tan(beta_b) times that along it; and the other way round. The axial
+    force turns both bodies the same way, so that their slopes are subtracted. The part of y y' alone, which spur gears
+    have too, is left out: it is less than a hundredth of the compliance.
     """
     pair = moving.pair
+    if not moving.helical:
+        return jnp.zeros_like(moving.face_coordinate, shape=(len(moving.face_coordinate),) * 2)
     leans = pair.path_slope * jnp.sin(pair.working_pressure_angle) * slopes
     middles = [0.5 * (real(beyond[1]) - real(beyond[0])) for beyond in pair.overhangs]
     one, other = (lean * (moving.face_coordinate - middle) for lean, middle in zip(leans, middles))
