@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import jaxgear as jg
-from benchmarks import accuracy, cases, face, goals, models, quantities, report
+from benchmarks import accuracy, cases, face, goals, helical, models, quantities, report
 
 CASE = cases.Case("A", "strain", 50.0, "par7.81x5.05")
 OTHER = cases.Case("L", "stress", 100.0, "linshort")
@@ -240,3 +240,19 @@ def test_figures_are_written(tmp_path, monkeypatch, second):
     results = accuracy.compare((models.DEFAULT, second), [CASE])
     (path,) = figures.write_figures(tmp_path, results)
     assert path.stat().st_size > 20_000
+
+
+def test_errors_of_helical_pairs_are_held_to_their_bounds():
+    """The reference itself has none; a grown one and what is not a number are told."""
+    results = {}
+    for name, data in helical.stored().items():
+        for key, case in data["cases"].items():
+            curve = case["mean_te_um"] + 0.5 * case["ppte_um"] * np.array([-1.0, 1.0])
+            results[f"{name} {key}"] = helical._errors(case, 3.0 * np.asarray(case["face_load"]), curve)
+    assert len(results) == 36 and all(error.close for error in results.values())
+    assert max(abs(value) for *_, value in helical._values(results)) < 0.1  # the digits of the file
+    assert helical.exceeded(results) == []
+    worst = next(iter(results))
+    for bad in (-50.0, float("nan")):
+        grown = {**results, worst: replace(results[worst], ripple=bad)}
+        assert [line.split()[:3] for line in helical.exceeded(grown)] == [[*worst.split(), "ripple:"]]

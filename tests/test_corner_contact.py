@@ -240,9 +240,10 @@ def test_without_extended_contact_pairs_carry_load_on_the_path_alone():
     """Nothing else changes: where no corner touches anyway, the transmission error is the same."""
     table = {"positions": 16, "pairs": 2, "slide_steps": 0}
     tables = [decode("resolution", table | {"extended_contact": on}, ResolutionSection) for on in (False, True)]
-    sizes = [resolution_of(table, [], bent=False) for table in tables]
+    pair = gear_pair()
+    sizes = [resolution_of(table, [], bent=False, longest=pair) for table in tables]
     assert sizes[1] == LINE
-    meshes = [prepare(gear_pair(), resolution=of) for of in sizes]
+    meshes = [prepare(pair, resolution=of) for of in sizes]
     removed = nothing_removed(LINE, meshes[0].path.dtype)
     off, on = (solve_removed(mesh, 50.0, removed) for mesh in meshes)
     assert off.converged.all() and on.converged.all()

@@ -934,7 +934,8 @@ def test_examples_load_and_are_what_their_name_says(path):
         "wear": "wear" in file.tables,
         "layout": "layout" in file.tables,
     }
-    kind = next((name for name, is_so in kinds.items() if is_so), "spur")
+    hand = "spur" if file.pair().is_spur else "helical"
+    kind = next((name for name, is_so in kinds.items() if is_so), hand)
     assert path.stem == f"{kind}_{teeth[0]}_{teeth[1]}"
     seeks = optimize_of(file).method in METHODS_WITHOUT_VARIABLES or kinds["layout"]
     assert (file.bounds or seeks) and file.title

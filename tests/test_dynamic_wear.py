@@ -110,6 +110,7 @@ def test_far_above_the_resonance_the_approach_stands_still(mesh, natural):
     np.testing.assert_allclose(motion.force[0], standing, atol=0.01 * standing.mean())
 
 
+@pytest.mark.slow
 def test_the_worn_volume_is_that_of_the_forces_of_the_motion(mesh, natural):
     """Of a life so short that the flanks stay what they are."""
     (_, motion), place = motion_at(mesh, natural), deposit(mesh, jnp.asarray(TORQUE), 9)

@@ -36,6 +36,7 @@ def static_force(mesh, share=1.0):
     return 1e3 * share * TORQUE / mesh.pair.pinion.base_radius
 
 
+@pytest.mark.slow
 def test_a_load_has_the_transmission_error_of_the_contact_analysis():
     mesh, force = mapped()
     removed = removed_material(mesh, TORQUE, **SLOPE)

@@ -336,6 +336,7 @@ def test_derivatives_of_the_cycle_by_the_angle_are_central_differences():
         np.testing.assert_allclose(jax.jit(mode(of_the_cycle))(at), wanted, rtol=1e-5, atol=1e-7)
 
 
+@pytest.mark.slow
 def test_many_torques_at_once():
     mesh = solved()[0]
     one = solved()[1]

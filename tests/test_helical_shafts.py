@@ -134,6 +134,7 @@ def test_mirrored_gearboxes_turn_their_influence_round():
     assert np.abs(support(gearbox(pair=left)).influence(Y) - influence).max() > 0.01 * influence.max()
 
 
+@pytest.mark.slow
 def test_flank_lines_level_helical_gears_on_shafts():
     """Of a mirrored gearbox the slope changes sign; the hand alone changes what the moments tilt."""
 
