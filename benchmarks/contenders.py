@@ -29,7 +29,8 @@ class Contender:
         precision: "float64" or "float32".
         gradient: whether the derivatives by the four parameters are computed too.
         batch: variants per batch of jaxgear or NumPy; zero where there is none.
-        coupled: whether slices are coupled, which those of the baselines do not.
+        coupled: whether slices are coupled, which those of the baselines are not.
+        helix_angle: [deg]; zero for spur gears, the only ones of the baselines.
     """
 
     kind: str
@@ -40,16 +41,18 @@ class Contender:
     gradient: bool = False
     batch: int = 0
     coupled: bool = False
+    helix_angle: float = 0.0
 
     @property
     def name(self) -> str:
         """What the table calls it."""
-        return f"{self.kind} {self.precision}" + " coupled" * self.coupled + " + gradient" * self.gradient
+        kind = " coupled" * self.coupled + f" helical {self.helix_angle:g}" * (self.helix_angle != 0)
+        return f"{self.kind} {self.precision}{kind}" + " + gradient" * self.gradient
 
     @property
-    def physics(self) -> tuple[int, bool]:
+    def physics(self) -> tuple[int, bool, float]:
         """What has to be equal for two contenders to agree."""
-        return self.slices, self.coupled
+        return self.slices, self.coupled, self.helix_angle
 
 
 @dataclass(frozen=True)
@@ -133,7 +136,7 @@ def _serve(connection: Connection, contender: Contender, positions: int, problem
         before = time.time()
         evaluate(variants)
         end = time.time()
-        own = kernel.problem if contender.kind == "jaxgear" else None
+        own = kernel.problem if contender.kind == "jaxgear" and not contender.helix_angle else None
         connection.send(Start(end - begin, end - before, versions, own))
         while True:
             request, argument = connection.recv()
@@ -184,6 +187,7 @@ def _make(contender: Contender, positions: int, problem: Problem | None):
             batch=contender.batch,
             gradient=contender.gradient,
             coupled=contender.coupled,
+            helix_angle=contender.helix_angle,
         )
         return kernel, versions | {"JAX": jax.__version__, "jaxlib": jaxlib.__version__}
     if contender.kind == "C":

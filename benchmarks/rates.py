@@ -12,9 +12,9 @@ _DIFFERENCES = ("PPTE", "gradient")
 _LEGEND = """\
 variants/s: the best repetition. / C, / NumPy: over their best rate with as many slices, C on all cores, NumPy on one.
 /core: variants per second of processor time, less sensitive to other work on the machine. cold start, compile: seconds
-from the start of the process and from the first call to the first result. coupled: coupled slices, another
-problem; the line tells what that costs. memory: peak in MiB. PPTE, gradient: largest difference from jaxgear in float64
-(coupled: from itself), in um and in um per um or mm."""
+from the start of the process and from the first call to the first result. coupled, helical: other problems, of coupled
+slices and of helical gears with the pairs that they need; the lines tell what that costs. memory: peak in MiB. PPTE,
+gradient: largest difference from jaxgear in float64 (of other problems from itself), in um and in um per um or mm."""
 
 
 def machine(cores: int) -> dict[str, str]:

@@ -23,6 +23,7 @@ from .rates import machine, print_rates
 # Variants per batch of jaxgear with one slice, fewer with more slices: the working set stays in the second-level cache.
 BATCH = 64
 _SLICES = 11
+_HELIX_ANGLE = 15.0  # [deg]
 # largest difference in PPTE from jaxgear in float64 [um]
 _TOLERANCE = {"float64": 1e-6, "float32": 1e-3}
 
@@ -66,9 +67,9 @@ def contenders(cores: int, batch: int, *, quick: bool) -> list[Contender]:
     """Everyone who takes part; jaxgear in float64 comes first of its physics, since it is the reference."""
     chunk = {1: 4096 if quick else 16384, _SLICES: 2048}
 
-    def jaxgear(slices, precision="float64", gradient=False, coupled=False):
+    def jaxgear(slices, precision="float64", gradient=False, coupled=False, helix_angle=0.0):
         size = max(batch // slices, 1)
-        return Contender("jaxgear", chunk[slices], slices, cores, precision, gradient, size, coupled)
+        return Contender("jaxgear", chunk[slices], slices, cores, precision, gradient, size, coupled, helix_angle)
 
     def numpy(slices):
         size = 64 if slices == 1 else 6
@@ -84,7 +85,11 @@ def contenders(cores: int, batch: int, *, quick: bool) -> list[Contender]:
     chosen += [numpy(1), Contender("SciPy", 2)]
     if not quick:
         chosen += [jaxgear(_SLICES, precision, gradient) for precision in _TOLERANCE for gradient in (False, True)]
-        chosen += [jaxgear(_SLICES, coupled=True)]
+        chosen += [
+            jaxgear(_SLICES, gradient=gradient, coupled=True, helix_angle=angle)
+            for angle in (0.0, _HELIX_ANGLE)
+            for gradient in (False, True)
+        ]
         if find_compiler():
             chosen += [Contender("C", 1000, _SLICES, threads=cores)]
         chosen += [numpy(_SLICES)]
@@ -109,8 +114,8 @@ def compare(
     rows: list[Row] = []
     versions: dict[str, str] = {}
     variants = random_variants(checked)
-    references: dict[tuple[int, bool], Process] = {}
-    gradients: dict[tuple[int, bool], np.ndarray] = {}
+    references: dict[tuple[int, bool, float], Process] = {}
+    gradients: dict[tuple[int, bool, float], np.ndarray] = {}
     with ExitStack() as stack:
         processes = []
         for contender in chosen:

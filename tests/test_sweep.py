@@ -24,7 +24,7 @@ from jaxgear.wear import WEAR_QUANTITIES
 
 BOUNDS = {"pinion": (0.0, 20.0), "wheel": (0.0, 20.0), "length": (1.0, 5.5)}
 # without those that need a speed, several slices or settings
-SLICED = "face_load_factor", "root_face_load_factor", "edge_load_factor"
+SLICED = "face_load_factor", "mean_face_load_factor", "root_face_load_factor", "edge_load_factor"
 OTHERS = (*LUBRICANT_QUANTITIES, *STRENGTH_QUANTITIES, *SLICED, *DYNAMIC_QUANTITIES, *WEAR_QUANTITIES)
 NAMES = tuple(name for name in quantities if name not in OTHERS)
 # of the curves, the contact, the gears and the flanks

@@ -9,7 +9,14 @@ class JaxKernel:
     """Chunks of `batch` variants that stay in the cache, one after the other on each core."""
 
     def __init__(
-        self, *, positions: int = 64, slices: int = 1, batch: int = 64, gradient: bool = False, coupled: bool = False
+        self,
+        *,
+        positions: int = 64,
+        slices: int = 1,
+        batch: int = 64,
+        gradient: bool = False,
+        coupled: bool = False,
+        helix_angle: float = 0.0,
     ):
         """Prepares the mesh; compiles nothing of the solution yet."""
         import jax
@@ -37,7 +44,7 @@ class JaxKernel:
         self._run = jax.jit(
             jax.shard_map(chunked, mesh=devices, in_specs=(same, split), out_specs=split, check_vma=False)
         )
-        self._mesh = prepare(positions, slices, coupled=coupled)
+        self._mesh = prepare(positions, slices, coupled=coupled, helix_angle=helix_angle)
         self._dtype = jnp.result_type(float)
         self._multiple = batch * jax.device_count()
         self._gradient = gradient

@@ -63,15 +63,15 @@ class Problem:
         return self.force / (self.lever * self.slice_width.sum())
 
 
-def prepare(positions: int = 64, slices: int = 1, *, coupled: bool = False):
-    """The prepared mesh of the 19/48 pair of `examples/spur_19_48.toml`, a `jaxgear.Mesh`.
+def prepare(positions: int = 64, slices: int = 1, *, coupled: bool = False, helix_angle: float = 0.0):
+    """The prepared mesh of the 19/48 pair of `examples/spur_19_48.toml`, a `jaxgear.Mesh`, or of such helical gears.
 
     The slices of the baselines are not coupled, and no gear overhangs the other.
     """
     import jaxgear as jg
 
-    pinion = jg.Gear(teeth=19, module=3.0, face_width=18.0, bore_diameter=24.0)
-    wheel = jg.Gear(teeth=48, module=3.0, face_width=18.0, bore_diameter=70.0)
+    pinion = jg.Gear(teeth=19, module=3.0, face_width=18.0, bore_diameter=24.0, helix_angle=helix_angle)
+    wheel = jg.Gear(teeth=48, module=3.0, face_width=18.0, bore_diameter=70.0, helix_angle=-helix_angle)
     pair = jg.GearPair(pinion, wheel)
     pairs = jg.fewest_pairs(pair, deflection=DEFLECTION)
     # the baselines leave the contacts at their nominal places

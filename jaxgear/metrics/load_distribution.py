@@ -112,28 +112,26 @@ Curve = Float[Array, " positions"]
 
 
 class _Face(NamedTuple):
-    """Load over the face of one pair.
+    """Load over the face.
 
     Attributes:
         line_load: slices last [N/mm].
         width: of every slice [mm].
-        share: of the face over which the contact line lies, all of it where the pair is unloaded.
     """
 
     line_load: Float[Array, "... slices"]
     width: Float[Array, " slices"]
-    share: Float[Array, "..."]
 
     @property
     def factor(self) -> Float[Array, "..."]:
         """Largest over mean line load."""
-        return factor_of(self.line_load, self.width) * self.share
+        return factor_of(self.line_load, self.width)
 
 
 @over_batch
 def face_load_factors(cycle: MeshCycle) -> Curve:
     """Of every position, largest over mean line load over the face of the pair with the largest line load there; of
-    helical gears of the pair with the largest force, over the part of the face where its contact line lies.
+    helical gears of all pairs together.
 
     Raises:
         ValueError: for a cycle of one slice.
@@ -145,8 +143,9 @@ def face_load_factors(cycle: MeshCycle) -> Curve:
 def face_load_factor(cycle: MeshCycle) -> Scalar:
     """K_Hbeta: largest over mean line load over the face, of the pair and at the position with the largest line load.
 
-    Of helical gears, where lines that enter at a corner of the flank carry a peak on little of the face, it is that of
-    the pairs with the largest force of every position, over the part of the face where the contact line lies.
+    Of helical gears it is `mean_face_load_factor`: their contact lines run across the profile too, so that a single
+    line is uneven by a tip relief, which ratings must not count as a fault of the face. For lead modifications of 10 to
+    20 um on a face of 6 modules both differ by 3 % or less where the angle goes to zero.
 
     Differentiable where that pair and position stay the same.
 
@@ -194,7 +193,7 @@ def edge_load_factor(cycle: MeshCycle) -> Scalar:
     mean = jnp.sum(face.line_load * face.width) / jnp.sum(face.width)
     idle = mean <= 0
     ends = jnp.maximum(face.line_load[0], face.line_load[-1])
-    return jnp.where(idle, 1.0, ends / jnp.where(idle, 1.0, mean)) * face.share
+    return jnp.where(idle, 1.0, ends / jnp.where(idle, 1.0, mean))
 
 
 def over_several_slices(factor: Callable[[MeshCycle], Scalar], cycle: MeshCycle) -> Scalar | float:
@@ -203,20 +202,13 @@ def over_several_slices(factor: Callable[[MeshCycle], Scalar], cycle: MeshCycle)
 
 
 def _at_positions(owner: str, cycle: MeshCycle) -> _Face:
-    """Of every position, the pair with the largest line load, of helical gears with the largest force; shape
-    (positions, slices).
-    """
+    """Of every position, the pair with the largest line load, of helical gears all; shape (positions, slices)."""
     _check_slices(owner, cycle)
     of, load = cycle.kinematics, jnp.moveaxis(cycle.line_load, 2, 0)  # positions, pairs, slices
-    size = load @ of.slice_width if of.helical else jnp.max(load, axis=2)
-    most = jnp.argmax(size, axis=1)[:, None, None]
-    found = _Face(jnp.take_along_axis(load, most, axis=1)[:, 0], of.slice_width, jnp.ones_like(load[:, 0, 0]))
-    if not of.helical:
-        return found
-    touching = jnp.moveaxis((of.contact_outside <= 0) | (cycle.line_load > 0), 2, 0)
-    touching = jnp.take_along_axis(touching, most, axis=1)[:, 0]
-    share = touching.astype(load.dtype) @ of.slice_width / jnp.sum(of.slice_width)
-    return found._replace(share=jnp.where(jnp.max(found.line_load, axis=1) > 0, share, 1.0))
+    if of.helical:
+        return _Face(jnp.sum(load, axis=1), of.slice_width)
+    most = jnp.argmax(jnp.max(load, axis=2), axis=1)[:, None, None]
+    return _Face(jnp.take_along_axis(load, most, axis=1)[:, 0], of.slice_width)
 
 
 def _check_slices(owner: str, cycle: MeshCycle) -> None:
@@ -225,7 +217,9 @@ def _check_slices(owner: str, cycle: MeshCycle) -> None:
 
 
 def _worst(owner: str, cycle: MeshCycle) -> _Face:
-    """Of these, that of the position with the largest line load; shape (slices,)."""
+    """Of these, that of the position with the largest line load, of helical gears the mean; shape (slices,)."""
     found = _at_positions(owner, cycle)
+    if cycle.kinematics.helical:
+        return found._replace(line_load=jnp.mean(found.line_load, axis=0))
     worst = jnp.argmax(jnp.max(found.line_load, axis=1))
-    return found._replace(line_load=found.line_load[worst], share=found.share[worst])
+    return found._replace(line_load=found.line_load[worst])
