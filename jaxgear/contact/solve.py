@@ -1,6 +1,7 @@
 """Contact of the loaded mesh over one base pitch."""
 
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import equinox as eqx
@@ -262,7 +263,27 @@ def contact_of(
         weight=mesh.slice_width,
         coupling=mesh.coupling,
     )
-    return problem, solve_contact(problem, steps=mesh.resolution.newton_steps, tolerance=mesh.resolution.rtol)
+    return problem, _solved(mesh, problem)
+
+
+def _solved(mesh: Mesh, problem: ContactProblem) -> ContactSolution:
+    """The solution of the problem.
+
+    Helical bodies lean by the total load and move all slices alike by its moment (`face_coupling`): under a known load
+    the one is a gap and the other part of the approach, which takes half the time of a support.
+    """
+    sizes, coupling = mesh.resolution, problem.coupling
+    solve = partial(solve_contact, steps=sizes.newton_steps, tolerance=sizes.rtol)
+    if problem.load is None or mesh.support is not None or coupling is None or coupling.support is None:
+        return solve(problem)
+    assert coupling.support_modes is not None
+    even, leaning = coupling.support_modes.T
+    by_load = coupling.support[1, 0] * even[0]
+    gap = leaning[:, None] * by_load * problem.load / jnp.mean(mesh.slice_width)
+    upright = replace(coupling, support_modes=None, support=None)
+    found = solve(replace(problem, gap=stored(problem.gap + problem.levers * gap), coupling=upright))
+    moment = jnp.sum(leaning[:, None] * coupling.weighted(jnp.sum(problem.levers * found.line_load, axis=0)), axis=0)
+    return replace(found, approach=found.approach + by_load * moment)
 
 
 def pair_forces(mesh: Mesh, line_load: Load) -> Float[Array, "pairs positions"]:
