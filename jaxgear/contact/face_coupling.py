@@ -3,7 +3,6 @@
 from dataclasses import replace
 from typing import NamedTuple
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -141,9 +140,7 @@ def coupling_of(
     loads = bends if weight is None else weight[:, None] * bends
     influence = influence.astype(kernels.dtype) * jnp.mean(moving.slice_width)
     bent = jnp.linalg.multi_dot([loads.T, influence, loads])
-    return eqx.tree_at(
-        lambda c: (c.support_modes, c.support), coupling, (bends, bent), is_leaf=lambda leaf: leaf is None
-    )
+    return replace(coupling, support_modes=bends, support=bent, crosswise=support is None)
 
 
 def _tilt(moving: Kinematics, slopes: Float[Array, "gears"]) -> Float[Array, "slices slices"]:

@@ -274,13 +274,14 @@ def _solved(mesh: Mesh, problem: ContactProblem) -> ContactSolution:
     """
     sizes, coupling = mesh.resolution, problem.coupling
     solve = partial(solve_contact, steps=sizes.newton_steps, tolerance=sizes.rtol)
-    if problem.load is None or mesh.support is not None or coupling is None or coupling.support is None:
+    if problem.load is None or coupling is None or not coupling.crosswise:
         return solve(problem)
-    assert coupling.support_modes is not None
+    assert coupling.support is not None and coupling.support_modes is not None
     even, leaning = coupling.support_modes.T
     by_load = coupling.support[1, 0] * even[0]
-    gap = leaning[:, None] * by_load * problem.load / jnp.mean(mesh.slice_width)
-    upright = replace(coupling, support_modes=None, support=None)
+    total = jnp.atleast_1d(problem.load / jnp.mean(mesh.slice_width))
+    gap = (leaning[:, None] * by_load * total[None])[None]
+    upright = replace(coupling, support_modes=None, support=None, crosswise=False)
     found = solve(replace(problem, gap=stored(problem.gap + problem.levers * gap), coupling=upright))
     moment = jnp.sum(leaning[:, None] * coupling.weighted(jnp.sum(problem.levers * found.line_load, axis=0)), axis=0)
     return replace(found, approach=found.approach + by_load * moment)

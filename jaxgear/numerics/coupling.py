@@ -90,6 +90,7 @@ class SliceCoupling(eqx.Module):
         rest: what all that is orthogonal to the modes has of C.
         support_modes: R, orthonormal likewise, the constant first; None without a support.
         support: H, symmetric and positive semi-definite, the deflection under line loads; None without a support.
+        crosswise: whether H only joins the even deflection with one other shape, zero but off its diagonal.
         other: of two bodies that spread loads in their own way each; None where both do alike.
         weight: w of the slices, over their mean; None where all are equal.
         scale: D, of loads and deflections of every spring, where a body is stiffer at one place than at another: D C D
@@ -102,6 +103,7 @@ class SliceCoupling(eqx.Module):
     rest: Float[Array, ""]
     support_modes: Float[Array, "slices bends"] | None = None
     support: Float[Array, "bends bends"] | None = None
+    crosswise: bool = eqx.field(static=True, default=False)
     other: Other | None = None
     weight: Float[Array, " slices"] | None = None
     scale: Float[Array, "pairs slices positions"] | None = None
