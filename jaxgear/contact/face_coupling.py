@@ -1,6 +1,8 @@
 """How teeth and bodies spread a load over their faces, and how the slices of a mesh are elastically coupled."""
 
 from dataclasses import replace
+from functools import reduce
+from operator import add
 from typing import NamedTuple
 
 import jax
@@ -130,15 +132,14 @@ def coupling_of(
     coupling = SliceCoupling(modes, shares[0], rests[0], weight=weight, scale=scale)
     if len(kernels) > 1:
         coupling = replace(coupling, other=Other(wheel, shares[1] - shares[0], rests[1] - rests[0]))
-    if support is None and not moving.helical:
+    parts = [_tilt(moving, slopes)] if moving.helical else []
+    if support is not None:
+        parts.append(support.influence(moving.face_coordinate))
+    if not parts:
         return coupling
-    bends, influence = jnp.asarray(_polynomials(sizes), kernels.dtype), _tilt(moving, slopes)
-    if support is None:
-        bends = bends[:, :2]
-    else:
-        influence = influence + support.influence(moving.face_coordinate)
+    bends = jnp.asarray(_polynomials(sizes), kernels.dtype)[:, : 2 if support is None else None]
     loads = bends if weight is None else weight[:, None] * bends
-    influence = influence.astype(kernels.dtype) * jnp.mean(moving.slice_width)
+    influence = reduce(add, parts).astype(kernels.dtype) * jnp.mean(moving.slice_width)
     bent = jnp.linalg.multi_dot([loads.T, influence, loads])
     return replace(coupling, support_modes=bends, support=bent, crosswise=support is None)
 
@@ -152,8 +153,6 @@ def _tilt(moving: Kinematics, slopes: Float[Array, "gears"]) -> Float[Array, "sl
     have too, is left out: it is less than a hundredth of the compliance.
     """
     pair = moving.pair
-    if not moving.helical:
-        return jnp.zeros_like(moving.face_coordinate, shape=(len(moving.face_coordinate),) * 2)
     leans = pair.path_slope * jnp.sin(pair.working_pressure_angle) * slopes
     middles = [0.5 * (real(beyond[1]) - real(beyond[0])) for beyond in pair.overhangs]
     one, other = (lean * (moving.face_coordinate - middle) for lean, middle in zip(leans, middles))

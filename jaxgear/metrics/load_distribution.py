@@ -164,7 +164,7 @@ def mean_face_load_factor(cycle: MeshCycle) -> Scalar:
         ValueError: for a cycle of one slice.
     """
     _check_slices("mean_face_load_factor", cycle)
-    return factor_of(jnp.mean(jnp.sum(cycle.line_load, axis=0), axis=1), cycle.kinematics.slice_width)
+    return _over_cycle(cycle).factor
 
 
 @over_batch
@@ -218,8 +218,14 @@ def _check_slices(owner: str, cycle: MeshCycle) -> None:
 
 def _worst(owner: str, cycle: MeshCycle) -> _Face:
     """Of these, that of the position with the largest line load, of helical gears the mean; shape (slices,)."""
-    found = _at_positions(owner, cycle)
     if cycle.kinematics.helical:
-        return found._replace(line_load=jnp.mean(found.line_load, axis=0))
+        _check_slices(owner, cycle)
+        return _over_cycle(cycle)
+    found = _at_positions(owner, cycle)
     worst = jnp.argmax(jnp.max(found.line_load, axis=1))
     return found._replace(line_load=found.line_load[worst])
+
+
+def _over_cycle(cycle: MeshCycle) -> _Face:
+    """All pairs together, mean over the cycle; shape (slices,)."""
+    return _Face(jnp.mean(jnp.sum(cycle.line_load, axis=0), axis=1), cycle.kinematics.slice_width)
