@@ -9,6 +9,7 @@ The pipeline in reading order, every step differentiable and vmappable:
     prepare, solve              loaded tooth contact over one base pitch -> MeshCycle
     peak_to_peak, ...           metrics on the MeshCycle
     monte_carlo                 what manufacturing tolerances make of it
+    solve_revolution            teeth that differ, over whole revolutions (jaxgear.revolution)
     sweep                       any number of modifications -> SweepTable
     minimize, free_form         the best modification, by gradient and by other methods
     dynamics                    mesh force, oscillators, steady states over the speed, orbits and their bifurcations
@@ -18,8 +19,8 @@ The pipeline in reading order, every step differentiable and vmappable:
     manufacture                 grinding wheel, volumes ground off, measuring charts
 
 The rest lives in the namespaces `jaxgear.geometry`, `compliance`, `contact`, `tolerance`, `conditions`, `metrics`,
-`sizing`, `sweeps`, `optimize`, `dynamics`, `wear`, `shafts`, `layout`, `manufacture`, `studies`, `plot` and `io`, with
-their `Abstract...` classes as extension points.
+`revolution`, `sizing`, `sweeps`, `optimize`, `dynamics`, `wear`, `shafts`, `layout`, `manufacture`, `studies`, `plot`
+and `io`, with their `Abstract...` classes as extension points.
 
 Units: mm for geometry, um for modifications and transmission error, N, N m (on the pinion), MPa, degrees in
 constructors.

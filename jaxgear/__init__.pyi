@@ -13,6 +13,7 @@ from . import microgeometry as microgeometry
 from . import numerics as numerics
 from . import optimize as optimize
 from . import plot as plot
+from . import revolution as revolution
 from . import shafts as shafts
 from . import sizing as sizing
 from . import studies as studies

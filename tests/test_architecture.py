@@ -24,6 +24,7 @@ ORDER = (
     "metrics",
     "tolerance",
     "conditions",
+    "revolution",
     "dynamics",
     "wear",
     "manufacture",

@@ -24,6 +24,7 @@ to 9 % too small, and the loaded width leaves 2.5 % at worst.
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -51,6 +52,7 @@ Scalar = Float[Array, ""]
 Load = Float[Array, "pairs slices positions"]
 Field = Float[Array, "pairs #slices positions"]
 Real = Float[Array, "..."]
+Own = tuple[AbstractModification, AbstractModification]
 
 
 class RemovedMaterial(Checked):
@@ -106,19 +108,41 @@ def slid_material(
     pinion: AbstractModification,
     wheel: AbstractModification,
     line_load: Load | None = None,
+    own: Own | None = None,
 ) -> RemovedMaterial:
     """What the contacts meet of the modifications; its arguments in the precision of the mesh.
 
     The contacts are as wide as their line loads make them [N/mm]; by default as one pair that carries the full load.
+    `own` are further modifications of pinion and wheel, every array of which has one entry per pair in front.
     """
     place, sizes, dtype = place_of(mesh, torque, line_load), mesh.resolution, torque.dtype
-    given = [(sided, varies_along_profile(sided, place)) for sided in terms_of(mesh, dtype, pinion, wheel)]
-    along = [sided for sided, slopes in given if slopes]  # what the contact slides down
-    amount = jnp.zeros((sizes.chosen_pairs, sizes.slices, sizes.positions), dtype)
-    for side, term in (sided for sided, slopes in given if not slopes):
+    sided = terms_of(mesh, dtype, pinion, wheel)
+    if own is None:
+        return _slid(place, sided, sizes, sizes.chosen_pairs)
+    # one pair after the other has a place of its own, with an axis of length one for it
+    places, count = jax.tree.map(lambda leaf: _by_pair(leaf, sizes.chosen_pairs), place), 1
+
+    def of_pair(place: Place, own: Own) -> RemovedMaterial:
+        return _slid(place, [*sided, *terms_of(mesh, dtype, *own)], sizes, count)
+
+    found = eqx.filter_vmap(of_pair)(places, own)
+    return RemovedMaterial(found.amount[:, 0], found.shift[:, 0], found.relative_curvature[:, 0])
+
+
+def _by_pair(leaf: Array | float, pairs: int) -> Array | float:
+    """A number of every place with the pairs as an axis in front; a plain number for all."""
+    return leaf if jnp.ndim(leaf) == 0 else jnp.broadcast_to(leaf, (pairs, *jnp.shape(leaf)[1:]))[:, None]
+
+
+def _slid(place: Place, sided: Sequence[Sided], sizes: Resolution, pairs: int) -> RemovedMaterial:
+    given = [(each, varies_along_profile(each, place)) for each in sided]
+    along = [each for each, slopes in given if slopes]  # what the contact slides down
+    amount = jnp.zeros((pairs, sizes.slices, sizes.positions), place.radius.dtype)
+    for side, term in (each for each, slopes in given if not slopes):
         amount = amount + term(flank_at(side, place, jnp.zeros_like(place.radius)))
     if not along:
-        return as_removed(sizes, amount)
+        flat = jnp.zeros((pairs, 1, sizes.positions), amount.dtype)
+        return RemovedMaterial(amount, flat, flat)
     found = _slide(along, place, contact_nodes(sizes.contact_nodes), sizes.chosen_slide_steps)
     return RemovedMaterial(amount + found[0], found[1], found[2])
 
@@ -203,6 +227,7 @@ def loaded_material(
     pinion: AbstractModification,
     wheel: AbstractModification,
     first_contact: Callable[[RemovedMaterial], tuple[Load, Curve]],
+    own: Own | None = None,
 ) -> RemovedMaterial:
     """Material removed, over contacts as wide as the compliance asks for; its arguments in the precision of the mesh.
 
@@ -211,18 +236,19 @@ def loaded_material(
         torque: on the pinion [N m].
         pinion, wheel: modifications.
         first_contact: line loads [N/mm] and residual of the contact on material that has been removed.
+        own: further modifications of every pair, see `slid_material`.
     """
-    if isinstance(pinion, NoModification) and isinstance(wheel, NoModification):
+    if own is None and isinstance(pinion, NoModification) and isinstance(wheel, NoModification):
         return nothing_removed(mesh.resolution, torque.dtype)
     sizes = mesh.resolution
     prepared = _unlabelled(mesh, sizes.of_material)
     if not mesh.compliance.averages_over_loaded_width:
-        return slid_material(prepared, torque, pinion, wheel)
+        return slid_material(prepared, torque, pinion, wheel, own=own)
     full = 1e3 * torque / (mesh.pair.pinion.base_radius * mesh.pair.face_width)
     line_load = jnp.broadcast_to(full, (sizes.chosen_pairs, sizes.slices, sizes.positions))
-    line_load, residual = first_contact(slid_material(prepared, torque, pinion, wheel, line_load))
+    line_load, residual = first_contact(slid_material(prepared, torque, pinion, wheel, line_load, own))
     # once: what the loads of a second solution change is below the error of the model
-    removed = slid_material(prepared, torque, pinion, wheel, line_load)
+    removed = slid_material(prepared, torque, pinion, wheel, line_load, own)
     # written so that NaN counts as not known
     known = jnp.where(residual < max(_WIDTHS_KNOWN, sizes.rtol or 0.0), removed.amount, jnp.nan)
     return RemovedMaterial(known, removed.shift, removed.relative_curvature)

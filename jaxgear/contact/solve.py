@@ -31,7 +31,7 @@ from .face_coupling import check_torque, ends_together, holds_at
 from .mesh import Mesh, begin_mesh, prepare
 from .operating_point import OperatingPoint, Torque, operating_point_of
 from .resolution import Resolution
-from .slide import RemovedMaterial, as_removed, for_contact, loaded_material, nothing_removed
+from .slide import Own, RemovedMaterial, as_removed, for_contact, loaded_material, nothing_removed
 from .status import Status, Statuses, status_of
 from .support import AbstractSupport
 
@@ -73,11 +73,11 @@ def solve(
     check_torque("solve", mesh.support_torque, operating_point.torque)
     pinion, wheel = flanks_of("solve", mesh, pinion, wheel)
     # two programs: that of the contact, by far the longer one to compile, serves every kind of modification
-    removed = _material(mesh, operating_point.torque, pinion, wheel)
+    removed = material_of(mesh, operating_point.torque, pinion, wheel)
     cycle = _cycle(
         mesh, operating_point, _solve_removed(for_contact(mesh), operating_point.torque, removed), pinion, wheel
     )
-    wider = _wider(mesh, cycle)
+    wider = wider_mesh(mesh, cycle.status)
     return cycle if wider is None else solve(wider, operating_point, pinion=pinion, wheel=wheel)
 
 
@@ -153,15 +153,19 @@ def removed_material(
     check_mesh("removed_material", mesh)
     torque = operating_point_of("removed_material", torque, mesh.slice_width.dtype).torque
     pinion, wheel = flanks_of("removed_material", mesh, pinion, wheel)
-    return _material(mesh, torque, pinion, wheel)
+    return material_of(mesh, torque, pinion, wheel)
 
 
-def _material(mesh: Mesh, torque: Scalar, pinion: AbstractModification, wheel: AbstractModification) -> RemovedMaterial:
+def material_of(
+    mesh: Mesh, torque: Scalar, pinion: AbstractModification, wheel: AbstractModification, own: Own | None = None
+) -> RemovedMaterial:
+    """`removed_material` of what is checked, with further modifications of every pair, see `slid_material`."""
+
     def first_contact(removed):
         contact = _solve_removed(for_contact(mesh), torque, removed)
         return contact["line_load"], contact["residual"]
 
-    return loaded_material(mesh, torque, pinion, wheel, first_contact)
+    return loaded_material(mesh, torque, pinion, wheel, first_contact, own)
 
 
 def begin_contact(
@@ -227,9 +231,9 @@ def _cycle(mesh: Mesh, operating_point: OperatingPoint, contact: dict[str, Any],
     )
 
 
-def _wider(mesh: Mesh, cycle: MeshCycle) -> Mesh | None:
+def wider_mesh(mesh: Mesh, status: Statuses) -> Mesh | None:
     """The mesh with more pairs, where their number was left open, is too small and can be known."""
-    if not more_pairs_help(mesh, cycle.status):
+    if not more_pairs_help(mesh, status):
         return None
     sizes = replace(mesh.resolution, pairs=mesh.resolution.chosen_pairs + 1)
     wider = prepare(mesh.pair, compliance=mesh.compliance, resolution=sizes, support=mesh.support)

@@ -1,0 +1,76 @@
+"""Settings: which teeth differ by how much, and over how many base pitches they run."""
+
+from math import lcm
+
+import equinox as eqx
+
+from ..geometry import GearPair
+from ..metrics import AbstractSettings
+from ..numerics import whole
+from .teeth import TeethDeviations, teeth_of
+
+_MOST_WINDOWS = 1_000_000
+_OVER = "pinion", "wheel", "hunting"
+
+
+class Teeth(AbstractSettings):
+    """Deviations of the teeth of both gears, and the base pitches over which the pair is solved.
+
+    `quantity` gives with it the numbers of a revolution, `REVOLUTION_QUANTITIES`.
+
+    Attributes:
+        pinion, wheel: deviations of the teeth; None for equal teeth.
+        over: "pinion" or "wheel" for one revolution of that gear, "hunting" for all pairings of teeth (lcm(z1, z2) base
+            pitches), or a number of base pitches; None for the revolution of the only gear whose teeth differ, and the
+            hunting period where those of both do.
+
+    Raises:
+        ValueError: for something else to run over.
+        TypeError: for deviations of another type.
+    """
+
+    table = "teeth"
+
+    pinion: TeethDeviations | None = None
+    wheel: TeethDeviations | None = None
+    over: str | int | None = eqx.field(static=True, default=None)
+
+    def check_together(self) -> None:
+        for name, of in (("pinion", self.pinion), ("wheel", self.wheel)):
+            if of is not None and not isinstance(of, TeethDeviations):
+                raise TypeError(f"Teeth: {name} is a {type(of).__name__}, must be of TeethDeviations")
+        if isinstance(self.over, int) and not isinstance(self.over, bool):
+            whole("Teeth", "over", self.over, high=_MOST_WINDOWS)
+        elif self.over is not None and self.over not in _OVER:
+            raise ValueError(
+                f'Teeth: over = {self.over!r} must be "pinion", "wheel", "hunting" or a number of base pitches'
+            )
+
+    @property
+    def deviations(self) -> tuple[TeethDeviations | None, TeethDeviations | None]:
+        """Of pinion and wheel."""
+        return self.pinion, self.wheel
+
+    def counts(self, pair: GearPair) -> tuple[int, int]:
+        """Numbers of teeth of a pair.
+
+        Raises:
+            ValueError: where it has others than the deviations, or a gear without deviations is being traced.
+        """
+        found = []
+        for name, gear, of in zip(("pinion", "wheel"), pair.gears, self.deviations):
+            count = teeth_of(gear, f"Teeth: {name}")
+            if of is not None and of.teeth != count:
+                raise ValueError(f"Teeth: {name} has deviations of {of.teeth} teeth, the gear has {count}")
+            found.append(count)
+        return found[0], found[1]
+
+    def windows(self, counts: tuple[int, int]) -> int:
+        """Number of base pitches, for numbers of teeth of pinion and wheel."""
+        over = self.over
+        if over is None:
+            only = [name for name, of in zip(_OVER, self.deviations) if of is not None]
+            over = only[0] if len(only) == 1 else "hunting"
+        if isinstance(over, int):
+            return over
+        return {"pinion": counts[0], "wheel": counts[1], "hunting": lcm(*counts)}[over]

@@ -1,0 +1,257 @@
+"""Contact over whole revolutions: one window of a base pitch after the other, each with the teeth that are in it."""
+
+from functools import partial, reduce
+from math import lcm
+from operator import add
+from typing import Any, Literal
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float, Int
+
+from ..contact import Mesh, MeshCycle, solve_removed
+from ..contact.face_coupling import check_torque
+from ..contact.operating_point import OperatingPoint, Torque, operating_point_of
+from ..contact.solve import check_mesh, flanks_of, material_of, outermost, wider_mesh
+from ..contact.status import Status, WithStatus, status_of
+from ..geometry import Gear
+from ..microgeometry import AbstractModification, terms
+from ..numerics import changed, kernel
+from .settings import Teeth
+from .teeth import TeethDeviations
+
+Curve = Float[Array, "*batch places"]
+GearName = Literal["pinion", "wheel"]
+GEARS = "pinion", "wheel"
+# points of contact that are solved together, as for the designs of a sweep: their arrays fit the cache of a CPU
+_SIDE_BY_SIDE = {"cpu": 2**12}
+_SIDE_BY_SIDE_ELSEWHERE = 2**20
+
+
+class Revolution(WithStatus, eqx.Module):
+    """Result of `solve_revolution`: mesh cycles one after the other, in which the teeth of the pair take turns.
+
+    Of many revolutions made by `jax.vmap` every array has the batch axes in front.
+
+    Attributes:
+        cycles: of the windows of one base pitch, with the windows as last of the batch axes; metrics take them as any
+            mesh cycles.
+        teeth: of pinion and wheel.
+        repeats: whether the last window is followed by the first one: whether the gears whose teeth differ have made
+            whole revolutions.
+    """
+
+    cycles: MeshCycle
+    teeth: tuple[int, int] = eqx.field(static=True)
+    repeats: bool = eqx.field(static=True)
+
+    @property
+    def status(self) -> Array:
+        """Of every place, see `MeshCycle`, shape (places,)."""
+        return _joined(self.cycles.status)
+
+    @property
+    def windows(self) -> int:
+        """Number of base pitches."""
+        return self.cycles.transmission_error.shape[-2]
+
+    @property
+    def phase(self) -> Float[Array, " places"]:
+        """Mesh position in base pitches, shape (places,) without batch axes; places are windows times positions."""
+        phase = self.cycles.phase
+        return (jnp.arange(self.windows, dtype=phase.dtype)[:, None] + phase[None]).ravel()
+
+    @property
+    def transmission_error(self) -> Curve:
+        """As of a mesh cycle [um], shape (places,)."""
+        return _joined(self.cycles.transmission_error)
+
+    @property
+    def unloaded_transmission_error(self) -> Curve:
+        """As of a mesh cycle [um], shape (places,)."""
+        return _joined(self.cycles.unloaded_transmission_error)
+
+    @property
+    def tangent_stiffness(self) -> Curve:
+        """As of a mesh cycle [N/um], shape (places,)."""
+        return _joined(self.cycles.tangent_stiffness)
+
+    @property
+    def pair_share(self) -> Float[Array, "*batch meshes"]:
+        """Load share of every pair, summed over the time that it is in mesh [base pitches]; 1 on average.
+
+        Pair 0 touches at the pitch point when the phase is 0. Where the windows repeat there are as many pairs as
+        windows; otherwise those that come and go within the windows, see `first_pair`.
+        """
+        forces = self.cycles.pair_force
+        shares = jnp.mean(forces / jnp.sum(forces, axis=-2, keepdims=True), axis=-1)
+        pairs, leading = shares.shape[-1], self.cycles.kinematics.resolution.leading
+        # pair n is row n - window + leading
+        if self.repeats:
+            return reduce(add, (jnp.roll(shares[..., row], row - leading, axis=-1) for row in range(pairs)))
+        whole = self.windows - pairs + 1
+        return reduce(add, (shares[..., pairs - 1 - row :, row][..., :whole] for row in range(pairs)))
+
+    @property
+    def first_pair(self) -> int:
+        """Number of the first of `pair_share`."""
+        resolution = self.cycles.kinematics.resolution
+        return 0 if self.repeats else resolution.chosen_pairs - 1 - resolution.leading
+
+    def __str__(self) -> str:
+        error = self.transmission_error
+        if error.ndim > 1:
+            return f"{error.shape[:-1]} of Revolution, {self.windows} base pitches"
+        state = "converged" if bool(jnp.all(self.converged)) else "NOT CONVERGED"
+        return (
+            f"Revolution of {self.teeth[0]}/{self.teeth[1]} teeth over {self.windows} base pitches, {state}\n"
+            f"  transmission error   mean {float(error.mean()):.3f} um, peak to peak {float(jnp.ptp(error)):.3f} um"
+        )
+
+
+def _joined(values: Array) -> Array:
+    """Values (windows, positions) of one place after the other."""
+    return values.reshape(*values.shape[:-2], -1)
+
+
+def solve_revolution(
+    mesh: Mesh,
+    torque: Torque,
+    teeth: Teeth,
+    *,
+    pinion: AbstractModification | None = None,
+    wheel: AbstractModification | None = None,
+) -> Revolution:
+    """Loaded tooth contact over whole revolutions of gears whose teeth differ.
+
+    Window k is the base pitch in which the mesh position runs from k to k + 1; pair n is tooth n mod z1 of the pinion
+    on tooth n mod z2 of the wheel. Each window is a contact problem of its own, solved as by `solve` for the material
+    that modifications and deviations of its teeth remove together. Only few windows are in memory at a time; reverse
+    mode works them out again.
+
+    Args:
+        mesh: prepared mesh; deviations that vary over the face need several slices.
+        torque: on the pinion [N m], scalar; or an `OperatingPoint`.
+        teeth: deviations of the teeth, and over how many base pitches.
+        pinion: modification of all teeth of the pinion; None for the nominal involute.
+        wheel: modification of all teeth of the wheel; None for the nominal involute.
+
+    Returns:
+        the revolution, differentiable with respect to every number. Where the number of pairs was left open and is too
+        small for this load, and nothing is traced, it has more of them.
+
+    Raises:
+        TypeError: for something else than a prepared mesh, settings of teeth or a modification.
+        ValueError: for deviations of another number of teeth, and as `solve`.
+    """
+    check_mesh("solve_revolution", mesh)
+    if not isinstance(teeth, Teeth):
+        raise TypeError(f"solve_revolution: teeth is a {type(teeth).__name__}, must be of Teeth")
+    operating_point = operating_point_of("solve_revolution", torque, mesh.slice_width.dtype)
+    check_torque("solve_revolution", mesh.support_torque, operating_point.torque)
+    flanks = flanks_of("solve_revolution", mesh, pinion, wheel)
+    _check_slices(mesh, teeth)
+    counts = teeth.counts(mesh.pair)
+    windows = teeth.windows(counts)
+    cycles = _cycles(mesh, operating_point, flanks, teeth.deviations, counts, windows)
+    wider = wider_mesh(mesh, cycles.status)
+    if wider is not None:
+        return solve_revolution(wider, operating_point, teeth, pinion=pinion, wheel=wheel)
+    differ = [count for count, of in zip(counts, teeth.deviations) if of is not None]
+    return Revolution(cycles, counts, windows % lcm(*differ) == 0)
+
+
+def _check_slices(mesh: Mesh, teeth: Teeth) -> None:
+    """Raises a `ValueError` where teeth differ along the face, which a mesh of one slice cannot show."""
+    if mesh.resolution.slices > 1:
+        return
+    for name, of in zip(GEARS, teeth.deviations):
+        if of is None or of.flanks is None:
+            continue
+        for tooth in range(of.teeth):
+            flank = jax.tree.map(lambda leaf, tooth=tooth: jnp.asarray(leaf)[tooth], of.flanks)
+            if any(term.varies_along_face for term in terms(flank)):
+                raise ValueError(
+                    f"solve_revolution: flanks of the {name} vary along the face, which a mesh of 1 slice cannot show: "
+                    "prepare with Resolution(slices=11)"
+                )
+
+
+Flanks = tuple[AbstractModification, AbstractModification]
+Deviations = tuple[TeethDeviations | None, TeethDeviations | None]
+
+
+@kernel
+def _cycles(
+    mesh: Mesh, at: OperatingPoint, flanks: Flanks, deviations: Deviations, counts: tuple[int, int], windows: int
+) -> MeshCycle:
+    """The cycles of all windows."""
+    dtype, sizes = mesh.slice_width.dtype, mesh.resolution
+    deviations = jax.tree.map(lambda leaf: leaf.astype(dtype) if eqx.is_inexact_array(leaf) else leaf, deviations)
+    # without teeth of their own shape the material is the same in all windows, but for a displacement of every pair
+    alike = not any(of is not None and of.differ_in_shape for of in deviations)
+    design = material_of(mesh, at.torque, *flanks) if alike else None
+
+    @partial(jax.checkpoint, prevent_cse=False)
+    def cycle(window: Int[Array, ""]) -> MeshCycle:
+        # with the pairs before and behind those of the window
+        numbers = window - sizes.leading + jnp.arange(-1, sizes.chosen_pairs + 1)
+        pitch = _displacement(mesh, deviations, counts, numbers)
+        removed = design
+        if removed is None:
+            own = _own(mesh, deviations, counts, numbers[1:-1])
+            removed = material_of(mesh, at.torque, *flanks, own)
+        removed = removed + pitch[1:-1, None, None]
+        found = solve_removed(mesh, at, removed)
+        return changed(found, status=_status(mesh, found, removed, pitch))
+
+    points = sizes.positions * sizes.slices
+    size = _SIDE_BY_SIDE.get(jax.default_backend(), _SIDE_BY_SIDE_ELSEWHERE)
+    return jax.lax.map(cycle, jnp.arange(windows), batch_size=min(max(size // points, 1), windows))
+
+
+def _displacement(mesh: Mesh, deviations: Deviations, counts: tuple[int, int], numbers: Array) -> Float[Array, " n"]:
+    """By how much the pairs are apart by their pitch deviations [um]."""
+    total = jnp.zeros(numbers.shape, mesh.slice_width.dtype)
+    for gear, of, count in zip(mesh.pair.gears, deviations, counts):
+        if of is not None:
+            total = total + of.along_line(gear).astype(total.dtype)[numbers % count]
+    return total
+
+
+def _own(mesh: Mesh, deviations: Deviations, counts: tuple[int, int], numbers: Array) -> Flanks:
+    """What the teeth of every pair have of their own, for `slid_material`."""
+
+    def of_gear(gear: Gear, of: TeethDeviations | None, count: int, direction: float) -> Any:
+        of = TeethDeviations(jnp.zeros(count, mesh.slice_width.dtype)) if of is None else of
+        return jax.vmap(lambda number: of.of_tooth(number, gear, direction))(numbers % count)
+
+    pinion, wheel = map(of_gear, mesh.pair.gears, deviations, counts, (1.0, -1.0))
+    return pinion, wheel
+
+
+def _status(mesh: Mesh, cycle: MeshCycle, removed: Any, pitch: Array) -> Array:
+    """That of a cycle, where the next pairs behind and ahead may be displaced against those at the edges."""
+    apart = jnp.minimum(jnp.minimum(pitch[0] - pitch[1], pitch[-1] - pitch[-2]), 0.0)
+    windup = mesh.hub * cycle.force / mesh.pair.face_width
+    error = cycle.transmission_error - windup - mesh.support_deflection(cycle.line_load)
+    near = error >= outermost(mesh, removed) + apart
+    return status_of({Status.MORE_PAIRS_NEEDED: near & cycle.converged}, cycle.status)
+
+
+def whole_revolutions(revolution: Revolution, gear: GearName, owner: str) -> int:
+    """Revolutions of a gear in the windows.
+
+    Raises:
+        ValueError: where it makes no whole number of them, so that it has no orders, or there is no such gear.
+    """
+    if gear not in GEARS:
+        raise ValueError(f'{owner}: gear = {gear!r} must be "pinion" or "wheel"')
+    teeth, windows = revolution.teeth[GEARS.index(gear)], revolution.windows
+    if windows % teeth or not revolution.repeats:
+        raise ValueError(
+            f"{owner}: {windows} base pitches are no whole revolutions of all gears whose teeth differ, or of the "
+            f'{gear} ({teeth} teeth): solve over "hunting"'
+        )
+    return windows // teeth

@@ -1,0 +1,233 @@
+"""By how much the teeth of a gear differ from each other.
+
+Teeth are counted in the order in which they come into mesh: pair n is tooth n mod z1 of the pinion on tooth n mod z2
+of the wheel. Deviations are positive where material is missing, like modifications. A measuring report that counts
+pitches in this order has that sign for the pinion, and the opposite one for the wheel, whose other side is touched.
+"""
+
+from collections.abc import Sequence
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float, PRNGKeyArray
+
+from ..geometry import Gear
+from ..microgeometry import AbstractModification, Flank, NoModification, Sum, terms
+from ..numerics import Checked, Given, check, concrete, number, real
+from ..tolerance import AbstractDistribution, ToleranceClass, TruncatedNormal
+
+Scalar = Float[Array, ""]
+Pitches = Float[Array, " teeth"]
+
+_MOST_ORDER = 1e5
+# Reports round to 0.1 um: of so many rounded pitches the sum is off by less than this times the root of their number
+_ROUNDED = 0.1
+
+
+class Undulation(Checked):
+    """A wave around a whole gear, over all its flanks: w = a cos(order * turn + phase), by the angle it has turned.
+
+    A tooth n touches, at the roll length rho and the face coordinate y, at turn = 2 pi n / z +- (rho / r_b - 2 y
+    tan(beta) / d), + of the pinion and - of the wheel, on which contacts move down the flank. An eccentric gear has the
+    order 1, one that was generated with a worm wheel of l teeth the ghost order l.
+
+    Attributes:
+        amplitude: half of peak to valley, normal to the flank.
+        order: waves around the gear.
+        phase: at tooth 0 on the base circle.
+    """
+
+    amplitude: Scalar = number("um", low=0.0)
+    order: Scalar = number("", low=1.0, high=_MOST_ORDER, whole=True)
+    phase: Scalar = number("deg", default=0.0)
+
+
+class _Wave(AbstractModification):
+    """An `Undulation` on one tooth: a cos(turns (rho - slope y) / r_b + start)."""
+
+    amplitude: Scalar = number("um")
+    turns: Scalar = number("")
+    start: Scalar = number("rad")
+    slope: Scalar | None = number("", optional=True, default=None)
+
+    @property
+    def varies_along_face(self) -> bool:
+        return self.slope is not None
+
+    def __call__(self, flank: Flank) -> Float[Array, "..."]:
+        rolled = flank.roll_length
+        if self.slope is not None:
+            rolled = rolled - self.slope * flank.face_coordinate
+        return self.amplitude * jnp.cos(self.turns * rolled / flank.base_radius + self.start)
+
+
+def _stacked(flanks: Any) -> Any:
+    """A list with one modification per tooth as one modification with a leading axis."""
+    if not isinstance(flanks, list | tuple):
+        return flanks
+    kinds: list[Any] = [
+        (jax.tree.structure(flank), [jnp.shape(leaf) for leaf in jax.tree.leaves(flank)]) for flank in flanks
+    ]
+    for tooth, flank in enumerate(flanks):
+        if not isinstance(flank, AbstractModification):
+            raise TypeError(f"TeethDeviations: flanks[{tooth}] is a {type(flank).__name__}, must be a modification")
+        if kinds[tooth] != kinds[0]:
+            raise ValueError(
+                f"TeethDeviations: flanks[{tooth}] is of another kind or shape than flanks[0], must be of the same"
+            )
+    return jax.tree.map(lambda *leaves: jnp.stack(leaves), *flanks) if flanks else None
+
+
+class TeethDeviations(Checked):
+    """Deviations of every tooth of one gear.
+
+        eccentric = TeethDeviations(np.zeros(48), undulations=[Undulation(10.0, order=1)])
+        slopes = TeethDeviations(np.zeros(48), jax.vmap(jg.ProfileSlope)(np.linspace(-3, 3, 48)))
+
+    Attributes:
+        pitch: cumulative pitch deviation F_pi of every tooth on the reference circle, shape (teeth,); its mean is of no
+            effect on anything but the mean transmission error.
+        flanks: modifications of the teeth, every array of which has one entry per tooth in front, as `jax.vmap` makes
+            them; or a list with one per tooth, all of one kind and size. None without.
+        undulations: around the gear.
+
+    Raises:
+        ValueError: for flanks of another number of teeth.
+        TypeError: for flanks that are no modifications.
+    """
+
+    pitch: Pitches = number("um", shape=("teeth",), fewest=2)
+    flanks: AbstractModification | None = eqx.field(converter=_stacked, default=None)
+    undulations: tuple[Undulation, ...] = eqx.field(converter=tuple, default=())
+
+    def check_together(self) -> None:
+        if self.flanks is not None and not isinstance(self.flanks, AbstractModification):
+            raise TypeError(f"TeethDeviations: flanks is a {type(self.flanks).__name__}, must be a modification")
+        for wave in self.undulations:
+            if not isinstance(wave, Undulation):
+                raise TypeError(f"TeethDeviations: undulations holds a {type(wave).__name__}, must be of Undulation")
+        for leaf in jax.tree.leaves(self.flanks):
+            if jnp.shape(leaf)[:1] != (self.teeth,):
+                raise ValueError(
+                    f"TeethDeviations: flanks has numbers of shape {jnp.shape(leaf)}, must have {self.teeth} in front, "
+                    "one per tooth: jax.vmap makes such modifications"
+                )
+
+    @property
+    def teeth(self) -> int:
+        """Number of teeth."""
+        return self.pitch.shape[0]
+
+    @classmethod
+    def from_single_pitch(
+        cls,
+        deviations: Given | Sequence[float],
+        flanks: AbstractModification | Sequence[AbstractModification] | None = None,
+        undulations: Sequence[Undulation] = (),
+    ) -> "TeethDeviations":
+        """Deviations with the cumulative pitch that follows from single pitch deviations.
+
+        Args:
+            deviations: f_pi of every tooth, from the one before it, on the reference circle [um], shape (teeth,).
+            flanks, undulations: the other fields.
+
+        Raises:
+            ValueError: where they do not close: around the gear they sum to zero, within the rounding of reports (0.1
+                um times the root of their number), which is spread over all pitches.
+        """
+        single = real(deviations, "TeethDeviations: single pitch deviations")
+        known, unit = concrete(single), "TeethDeviations: single pitch deviations"
+        if single.ndim != 1:
+            raise ValueError(f"{unit} have shape {single.shape}, must be a list of numbers, one per tooth")
+        check("TeethDeviations", "single pitch deviations", single, "um")
+        allowed = _ROUNDED * np.sqrt(single.shape[0])
+        if known is not None and abs(known.sum()) > allowed:
+            raise ValueError(
+                f"{unit} sum to {known.sum():.4g} um around the gear, must sum to 0 um within {allowed:.2g} um"
+            )
+        return cls(jnp.cumsum(single - jnp.mean(single)), _stacked(flanks), tuple(undulations))
+
+    @classmethod
+    def drawn(
+        cls,
+        gear: Gear,
+        quality_class: Given,
+        *,
+        key: PRNGKeyArray,
+        distribution: AbstractDistribution | None = None,
+    ) -> "TeethDeviations":
+        """Random deviations of a gear within the pitch and run-out tolerances of ISO 1328-1:2013.
+
+        The gear is eccentric (order 1) by up to half the run-out tolerance F_rT = 0.9 F_pT, oval (order 2) by what the
+        cumulative pitch tolerance F_pT then leaves, each times a draw and at a random phase, and every tooth is
+        displaced on its own by up to half of what f_pT leaves. So no draw exceeds f_pT, F_pT or F_rT.
+
+        Args:
+            gear: of a concrete number of teeth.
+            quality_class: flank tolerance class, 1 (finest) to 11.
+            key: of the random numbers; `jax.vmap` over many.
+            distribution: between the limits; None for `TruncatedNormal()`.
+
+        Raises:
+            ValueError: for a class or a gear outside the range of the standard.
+        """
+        limits, draw = ToleranceClass.of(gear, quality_class), distribution or TruncatedNormal()
+        teeth, dtype = teeth_of(gear, "TeethDeviations.drawn"), gear.module.dtype
+        sizes, phases, single = jax.random.split(key, 3)
+        # along the line of action a pitch deviation counts by cos(alpha_t)
+        cosine = jnp.cos(gear.transverse_pressure_angle)
+        slow = 0.5 * cosine * jnp.maximum(limits.total_pitch - limits.single_pitch, 0.0)
+        share = draw(sizes, (2,), dtype)
+        eccentric = jnp.minimum(0.5 * _RUN_OUT * limits.total_pitch, slow) * jnp.abs(share[0])
+        oval = (slow - eccentric) * jnp.abs(share[1])
+        steps = 2 * np.pi / teeth * (eccentric + 2 * oval) / cosine
+        alone = 0.5 * jnp.maximum(limits.single_pitch - steps, 0.0)
+        degrees = jax.random.uniform(phases, (2,), dtype, 0.0, 360.0)
+        waves = Undulation(eccentric, real(1.0), degrees[0]), Undulation(oval, real(2.0), degrees[1])
+        return cls(alone * draw(single, (teeth,), dtype), undulations=waves)
+
+    def along_line(self, gear: Gear) -> Pitches:
+        """Displacement of every tooth by its pitch deviation, along the line of action [um]."""
+        return self.pitch * jnp.cos(gear.transverse_pressure_angle).astype(self.pitch.dtype)
+
+    @property
+    def differ_in_shape(self) -> bool:
+        """Whether teeth differ by more than their pitch."""
+        return self.flanks is not None or bool(self.undulations)
+
+    def of_tooth(self, tooth: Array, gear: Gear, direction: float) -> AbstractModification:
+        """What is removed from one tooth besides its pitch deviation.
+
+        Args:
+            tooth: its number.
+            gear: the gear.
+            direction: 1 of the pinion, -1 of the wheel.
+        """
+        found: list[AbstractModification] = []
+        if self.flanks is not None:
+            found += terms(jax.tree.map(lambda leaf: leaf[tooth], self.flanks))
+        slope = None if gear.is_spur else jnp.tan(gear.base_helix_angle)
+        for wave in self.undulations:
+            order = wave.order.astype(wave.phase.dtype)
+            start = 2 * np.pi / self.teeth * order * tooth.astype(order.dtype) + jnp.deg2rad(wave.phase)
+            found.append(_Wave(wave.amplitude, direction * order, start, slope))
+        return Sum(tuple(found)) if found else NoModification()
+
+
+# F_rT over F_pT, ISO 1328-1:2013, annex on run-out
+_RUN_OUT = 0.9
+
+
+def teeth_of(gear: Gear, owner: str) -> int:
+    """Number of teeth of a gear.
+
+    Raises:
+        ValueError: where it is being traced.
+    """
+    known = concrete(gear.teeth)
+    if known is None:
+        raise ValueError(f"{owner}: the number of teeth is being traced, must be concrete")
+    return int(known)
