@@ -174,6 +174,7 @@ OF_ANY_TYPE = {
     "io/table_keys.py built": "makes an object of the class that the table names",
     "io/table_keys.py entry": "stands for the value of a key, whose annotation says the type",
     "io/tables.py FurtherTable.check": "takes a `DesignFile`, whose file imports this one",
+    "io/tables.py FurtherTable.quantity": "likewise",
     "io/template.py Part.build": "makes an object of the class that the part names",
     "studies/registry.py load": "a class of a file that is imported when it is asked for",
     "sweeps/store.py Store.table": "an object of a package that is imported when it is asked for",

@@ -337,6 +337,7 @@ def test_all_result_files_are_there(folder, analyzed, optimized, iterated):
     of_others |= {"life.csv", "worn_flanks.csv", "worn_flanks.parquet", "worn_pinion.png", "worn_wheel.png"}
     of_others |= {"ppte_over_life.png", "depth_over_life.png", "dynamic_factor_over_life.png"}  # of `jaxgear wear`
     of_others |= {"life_ppte_distribution.png"}
+    of_others |= {"revolution.csv", "revolution.png", "orders.csv", "orders.png"}  # of `jaxgear revolution`
     assert {path.name for path in target.iterdir()} == RESULT_FILES - of_others
     for other in (optimized.target, folder / "analyzed"):
         assert {path.name for path in other.iterdir()} == {"summary.json", "flanks.csv", "report.html"}

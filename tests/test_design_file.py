@@ -932,6 +932,7 @@ def test_examples_load_and_are_what_their_name_says(path):
         "dynamics": "dynamics" in file.tables,
         "robust": bool(optimize_of(file).manufactured),
         "wear": "wear" in file.tables,
+        "teeth": "teeth" in file.tables,
         "layout": "layout" in file.tables,
     }
     hand = "spur" if file.pair().is_spur else "helical"

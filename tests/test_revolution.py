@@ -184,8 +184,8 @@ def test_single_pitch_deviations_close():
         (lambda: Teeth(over="never"), 'over = \'never\' must be "pinion", "wheel", "hunting" or a number'),
         (lambda: Teeth(over=0), "over = 0 must be a whole number of at least 1"),
         (
-            lambda: Teeth(TeethDeviations(np.zeros(20))).counts(mesh().pair),
-            "deviations of 20 teeth, the gear has 19",
+            lambda: Teeth(TeethDeviations(np.zeros(20))).counts_of(mesh().pair),
+            "pinion has 20 teeth by counts or deviations, 19 by its gear",
         ),
         (lambda: TeethDeviations([1.0, np.nan]), "pitch = nan um must be finite"),
         (

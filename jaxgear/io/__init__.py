@@ -29,6 +29,7 @@ from .rexs import write_rexs as write_rexs
 from .rows import read_variants as read_variants
 from .sweep_table import SweepRequest as SweepRequest
 from .sweep_table import sweep_request as sweep_request
+from .teeth_table import teeth_of as teeth_of
 from .wear_table import WearRequest as WearRequest
 from .wear_table import wear_request as wear_request
 from .worn import read_worn as read_worn

@@ -276,6 +276,11 @@ class DesignFile:
         return replace(self._mesh.resolution, pairs=pairs)
 
     @property
+    def takes_more_pairs(self) -> bool:
+        """Whether the file leaves the number of tooth pairs open."""
+        return self._mesh.resolution.pairs is None
+
+    @property
     def left_out(self) -> str:
         """What of shafts, bearings and housing `mesh` lacks and why, in words; "" for nothing."""
         if self.support is None:

@@ -6,6 +6,8 @@ import numpy as np
 
 from ..dynamics import Dynamics
 from ..dynamics.motion import SAMPLES
+from ..dynamics.quantities import AT_SPEED
+from ..metrics import Quantity
 from .design_file import DesignFile
 from .errors import DesignFileError, naming
 from .table_keys import entry, part_of, section_of
@@ -35,6 +37,13 @@ class DynamicsSection(FurtherTable, section_of(Dynamics, ("mesh_frequencies",), 
     def check(self, design: DesignFile) -> None:
         """As a study of all commands does."""
         dynamics_request(design)
+
+    def quantity(self, design: DesignFile, key: str, quantity: Quantity) -> Quantity:
+        """As `FurtherTable.quantity`; some need a speed."""
+        name = quantity.name
+        if name in AT_SPEED and design.speed is None:
+            raise DesignFileError(key, f'"{name}" needs load.speed; "worst_{name}" is that of all speeds of [dynamics]')
+        return quantity.with_settings(dynamics_of(design))
 
 
 _QUICK_NUMBER = 24

@@ -153,7 +153,7 @@ def read_flank(
         raise ValueError(f"read_flank: base_radius = {base_radius:g} mm has no effect beside side")
     with naming(path):
         rows = _at_life(_chosen(read_rows(Path(path)), {"gear": gear, "design": design}), revolutions)
-        flank, reach = _table(rows, base_radius if side is None else float(side.base_radius), method)
+        flank, reach = flank_of_rows(rows, base_radius if side is None else float(side.base_radius), method)
         if side is not None:
             reach.check_on(side.gear, side.start_roll_length, side.common_width, side.face_middle)
         return flank
@@ -188,7 +188,7 @@ def flank_part(section: FlankFileSection, folder: Path) -> template.Part:
             gear = section.at.partition(".")[0]
         method: Any = section.method
         rows = _at_life(_chosen(rows, {_GEAR: gear, "design": section.design}), section.revolutions)
-        flank, reach = _table(rows, None, method)
+        flank, reach = flank_of_rows(rows, None, method)
     return template.Part(_FromFile(path.name, reach), {"flank": flank}, section.at)
 
 
@@ -201,9 +201,14 @@ def check_files(parts: Mapping[str, Sequence[template.Part]], pair: GearPair) ->
     for name, several in parts.items():
         for part in several:
             if isinstance(part.make, _FromFile):
-                start, middle = starts(pair)[name], pair.face_middles[name == "wheel"]
                 with referring(f"{part.key}.file", part.make.name):
-                    part.make.reach.check_on(getattr(pair, name), start, pair.face_width, middle)
+                    check_flank(part.make.reach, pair, name)
+
+
+def check_flank(reach: FlankRange, pair: GearPair, name: str) -> None:
+    """Refuses a table that is not on the flank of the gear of that name, see `FlankRange.check_on`."""
+    middle = pair.face_middles[name == "wheel"]
+    reach.check_on(getattr(pair, name), starts(pair)[name], pair.face_width, middle)
 
 
 @dataclass(frozen=True)
@@ -222,10 +227,14 @@ class _FromFile:
         return flank
 
 
-def _table(
-    rows: Rows, base_radius: float | None, method: Method
+def flank_of_rows(
+    rows: Rows, base_radius: float | None, method: Method = "linear"
 ) -> tuple[TabulatedProfile | TabulatedFlank, FlankRange]:
-    """The flank of the rows, and where they are."""
+    """The flank of the rows, and where they are.
+
+    Raises:
+        DesignFileError: where they are no flank.
+    """
     amount = next((name for name in _AMOUNTS if name in rows[0]), None)
     if amount is None:
         raise DesignFileError("", f"has no column {', '.join(_AMOUNTS)}, must have one")
@@ -276,7 +285,7 @@ def _at_life(rows: Rows, revolutions: float | None) -> Rows:
         if revolutions is None:
             return rows
         raise DesignFileError("", f"{_LIFE} = {revolutions:g} is not in the file, there is no column {_LIFE}")
-    lives = _numbers(rows, _LIFE)
+    lives = numbers_of(rows, _LIFE)
     known = np.unique(lives)
     if revolutions is None and len(known) == 1:
         return rows
@@ -291,8 +300,8 @@ def _at_life(rows: Rows, revolutions: float | None) -> Rows:
 
 def _grid(rows: Rows, amount: str, base_radius: float | None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Roll lengths, face coordinates and material removed, shape (rolls, faces), of points on a grid."""
-    along, removed = _along(rows, base_radius), _AMOUNTS[amount] * _numbers(rows, amount)
-    across = _numbers(rows, _ACROSS) if _ACROSS in rows[0] else np.zeros(len(rows))
+    along, removed = _along(rows, base_radius), _AMOUNTS[amount] * numbers_of(rows, amount)
+    across = numbers_of(rows, _ACROSS) if _ACROSS in rows[0] else np.zeros(len(rows))
     roll, row = np.unique(along, return_inverse=True)
     face, column = np.unique(across, return_inverse=True)
     table = np.full((len(roll), len(face)), np.nan)
@@ -306,24 +315,29 @@ def _grid(rows: Rows, amount: str, base_radius: float | None) -> tuple[np.ndarra
 
 def _along(rows: Rows, base_radius: float | None) -> np.ndarray:
     if _ALONG in rows[0]:
-        found = _numbers(rows, _ALONG)
+        found = numbers_of(rows, _ALONG)
         if (found < 0).any():
             raise DesignFileError("", f"{_ALONG} = {found.min():g} mm must be at least 0 mm (base circle)")
         return found
     if base_radius is None:
         raise DesignFileError("", f"has no column {_ALONG}, must have one where no base radius is given")
     if "roll_angle_deg" in rows[0]:
-        return np.deg2rad(_numbers(rows, "roll_angle_deg")) * base_radius
+        return np.deg2rad(numbers_of(rows, "roll_angle_deg")) * base_radius
     if "diameter_mm" not in rows[0]:
         raise DesignFileError("", f"has no column {_ALONG}, roll_angle_deg, diameter_mm, must have one")
-    radius = 0.5 * _numbers(rows, "diameter_mm")
+    radius = 0.5 * numbers_of(rows, "diameter_mm")
     if (radius < base_radius).any():
         least = f"must be at least {2 * base_radius:g} mm (base circle)"
         raise DesignFileError("", f"diameter_mm = {2 * radius.min():g} mm {least}")
     return np.sqrt(radius**2 - base_radius**2)
 
 
-def _numbers(rows: Rows, column: str) -> np.ndarray:
+def numbers_of(rows: Rows, column: str) -> np.ndarray:
+    """A column of numbers.
+
+    Raises:
+        DesignFileError: where one is not a finite number.
+    """
     found = np.empty(len(rows))
     for index, row in enumerate(rows):
         try:

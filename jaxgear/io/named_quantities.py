@@ -2,15 +2,11 @@
 
 from collections.abc import Iterator
 
-from ..dynamics import Dynamics
-from ..dynamics.quantities import AT_SPEED
 from ..metrics import Quantity
 from ..vocabulary import quantities
-from ..wear import Wear
 from .design_file import DesignFile
-from .dynamics_table import dynamics_of
 from .errors import DesignFileError, check_known
-from .wear_table import wear_of
+from .tables import FurtherTable
 
 
 def quantity_named(design: DesignFile, key: str, name: str) -> str | Quantity:
@@ -31,20 +27,20 @@ def quantity_named(design: DesignFile, key: str, name: str) -> str | Quantity:
     missing = _missing(design, quantity)
     if missing:
         raise DesignFileError(key, f'"{quantity.name}" needs {missing}')
-    if quantity.takes is Dynamics:
-        return dynamic_quantity(design, key, quantity)
-    if quantity.takes is Wear:
-        return wear_quantity(design, quantity)
     settings = design.tables.get(quantity.takes.table)
+    if isinstance(settings, FurtherTable):
+        return settings.quantity(design, key, quantity)
     return name if settings is None else quantity.with_settings(settings)
 
 
 def quantities_of_tables(design: DesignFile) -> Iterator[Quantity]:
-    """All quantities of settings but of vibration and wear, as far as a design file tells what they need."""
+    """All quantities of settings but those that solve further, as far as a design file tells what they need."""
     for quantity in quantities.values():
-        if quantity.takes in (None, Dynamics, Wear) or _missing(design, quantity):
+        if quantity.takes is None or _missing(design, quantity):
             continue
         settings = design.tables.get(quantity.takes.table)
+        if isinstance(settings, FurtherTable):
+            continue
         yield quantity if settings is None else quantity.with_settings(settings)
 
 
@@ -68,27 +64,3 @@ def _missing(design: DesignFile, quantity: Quantity) -> str:
         if getattr(design, name) is None:
             return f"load.{name}" + (f" or the table [{table}]" if name != "speed" else "")
     return ""
-
-
-def dynamic_quantity(design: DesignFile, key: str, quantity: Quantity) -> Quantity:
-    """A dynamic quantity with the settings of the table [dynamics], which is there.
-
-    Raises:
-        DesignFileError: without a speed that the quantity needs.
-    """
-    name = quantity.name
-    if name in AT_SPEED and design.speed is None:
-        raise DesignFileError(key, f'"{name}" needs load.speed; "worst_{name}" is that of all speeds of [dynamics]')
-    return quantity.with_settings(dynamics_of(design))
-
-
-def wear_quantity(design: DesignFile, quantity: Quantity) -> Quantity:
-    """A quantity of worn flanks with the settings of the table [wear], which has what the quantity needs."""
-    section = design.tables["wear"]  # `quantity_named` has looked
-    if section.largest_increment is not None and section.blocks is None:
-        problem = (
-            f'missing, "{quantity.name}" needs it: wear.largest_increment is for the lives of `jaxgear wear` alone'
-        )
-        raise DesignFileError("wear.blocks", problem)
-    vibrates = quantity.needs == "dynamics" or section.line_load == "dynamic"
-    return quantity.with_settings(wear_of(design, vibrates=vibrates))

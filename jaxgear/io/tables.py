@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any, ClassVar, Self
 
 from ..contact import OperatingPoint
+from ..metrics import Quantity
 from ..numerics import Checked, Number
 from .errors import DesignFileError, join, referring
 from .model_table import ModelSection
@@ -94,6 +95,19 @@ class FurtherTable(FileTable):
 
     def check(self, design: Any) -> None:
         """Raises a `DesignFileError` for what is wrong with the table in a design file that is read otherwise."""
+
+    def quantity(self, design: Any, key: str, quantity: Quantity) -> Quantity:
+        """A quantity of the settings that the table stands for, with them.
+
+        Args:
+            design: the `DesignFile`, which has what the quantity needs.
+            key: where its name stands.
+            quantity: of the vocabulary.
+
+        Raises:
+            DesignFileError: where the table does not say all that the quantity needs.
+        """
+        raise NotImplementedError
 
     @classmethod
     def inner(cls) -> Mapping[str, type[FileTable]]:

@@ -3,6 +3,7 @@
 import dataclasses
 
 from ..conditions import LoadSpectrum
+from ..metrics import Quantity
 from ..wear import Wear
 from .design_file import DesignFile
 from .dynamics_table import dynamics_of
@@ -34,6 +35,16 @@ class WearSection(FurtherTable, section_of(Wear, ("dynamics", "loads"), open=Fal
     def check(self, design: DesignFile) -> None:
         """As a study of all commands does."""
         wear_request(design)
+
+    def quantity(self, design: DesignFile, key: str, quantity: Quantity) -> Quantity:
+        """As `FurtherTable.quantity`; blocks are of equal length."""
+        if self.largest_increment is not None and self.blocks is None:
+            problem = (
+                f'missing, "{quantity.name}" needs it: wear.largest_increment is for the lives of `jaxgear wear` alone'
+            )
+            raise DesignFileError("wear.blocks", problem)
+        vibrates = quantity.needs == "dynamics" or self.line_load == "dynamic"
+        return quantity.with_settings(wear_of(design, vibrates=vibrates))
 
 
 _QUICK_BLOCKS = 4

@@ -41,6 +41,8 @@ from .mesh_cycle import mesh_stiffness as mesh_stiffness
 from .mesh_cycle import meshing_diagram as meshing_diagram
 from .mesh_cycle import pressure as pressure
 from .mesh_cycle import transmission_error as transmission_error
+from .revolution import order_spectrum as order_spectrum
+from .revolution import revolution as revolution
 from .variants import face_load_over_torque as face_load_over_torque
 from .variants import fan as fan
 from .variants import harris_map as harris_map

@@ -237,6 +237,8 @@ CAPTIONS = {
     "shaft_deflection": "Elastic lines of the shafts at the design torque, exaggerated, with bearings and gears.",
     "tolerance_cases": "Load over the face under the combinations of deviations within the tolerances.",
     "face_load_factors": "Face load factor under the combinations of deviations within the tolerances.",
+    "revolution": "Transmission error over the first revolution of the gear with more teeth.",
+    "orders": "Amplitudes of the transmission error over the order of the pinion, with what they come from.",
     "worn_pinion": "Flank of the pinion at several time steps.",
     "worn_wheel": "Flank of the wheel at several time steps.",
     "ppte_over_life": "PPTE over the life.",

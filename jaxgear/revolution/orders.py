@@ -12,6 +12,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
+from numpy.typing import ArrayLike
 
 from ..metrics import MESH_QUANTITIES, Quantity
 from ..metrics.excitation import Harmonics
@@ -96,6 +97,11 @@ class NamedOrder(NamedTuple):
     amplitude: float
 
 
+def amplitudes(curve: ArrayLike) -> np.ndarray:
+    """Amplitudes of all lines of a spectrum: line k is k waves over all windows."""
+    return np.abs(np.fft.rfft(np.asarray(curve))) * (2 / np.size(curve))
+
+
 def named_orders(revolution: Revolution, teeth: Teeth, harmonics: int = 3) -> list[NamedOrder]:
     """Mesh orders, shaft orders 1 to 3, side bands and ghost orders of both gears, as far as the windows have them.
 
@@ -107,7 +113,7 @@ def named_orders(revolution: Revolution, teeth: Teeth, harmonics: int = 3) -> li
     Returns:
         the lines by the order of the pinion, each named once: a ghost order that is a side band too counts as ghost.
     """
-    amplitude = np.abs(np.fft.rfft(revolution.transmission_error)) * (2 / revolution.phase.size)
+    amplitude = amplitudes(revolution.transmission_error)
     windows, found = revolution.windows, {}
     for number in range(1, harmonics + 1):
         found[number * windows] = "mesh", number

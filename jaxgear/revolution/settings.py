@@ -6,10 +6,10 @@ import equinox as eqx
 
 from ..geometry import GearPair
 from ..metrics import AbstractSettings
-from ..numerics import whole
-from .teeth import TeethDeviations, teeth_of
+from ..numerics import concrete, whole
+from .teeth import TeethDeviations
 
-_MOST_WINDOWS = 1_000_000
+MOST_WINDOWS = 1_000_000
 _OVER = "pinion", "wheel", "hunting"
 
 
@@ -23,6 +23,8 @@ class Teeth(AbstractSettings):
         over: "pinion" or "wheel" for one revolution of that gear, "hunting" for all pairings of teeth (lcm(z1, z2) base
             pitches), or a number of base pitches; None for the revolution of the only gear whose teeth differ, and the
             hunting period where those of both do.
+        counts: numbers of teeth of pinion and wheel; None for those of deviations and gears. A gear without deviations
+            whose numbers are traced, as in sweeps and searches, needs them.
 
     Raises:
         ValueError: for something else to run over.
@@ -34,13 +36,14 @@ class Teeth(AbstractSettings):
     pinion: TeethDeviations | None = None
     wheel: TeethDeviations | None = None
     over: str | int | None = eqx.field(static=True, default=None)
+    counts: tuple[int, int] | None = eqx.field(static=True, default=None)
 
     def check_together(self) -> None:
         for name, of in (("pinion", self.pinion), ("wheel", self.wheel)):
             if of is not None and not isinstance(of, TeethDeviations):
                 raise TypeError(f"Teeth: {name} is a {type(of).__name__}, must be of TeethDeviations")
         if isinstance(self.over, int) and not isinstance(self.over, bool):
-            whole("Teeth", "over", self.over, high=_MOST_WINDOWS)
+            whole("Teeth", "over", self.over, high=MOST_WINDOWS)
         elif self.over is not None and self.over not in _OVER:
             raise ValueError(
                 f'Teeth: over = {self.over!r} must be "pinion", "wheel", "hunting" or a number of base pitches'
@@ -51,18 +54,25 @@ class Teeth(AbstractSettings):
         """Of pinion and wheel."""
         return self.pinion, self.wheel
 
-    def counts(self, pair: GearPair) -> tuple[int, int]:
+    def counts_of(self, pair: GearPair) -> tuple[int, int]:
         """Numbers of teeth of a pair.
 
         Raises:
-            ValueError: where it has others than the deviations, or a gear without deviations is being traced.
+            ValueError: where it has others than the deviations, or a number is needed that is being traced.
         """
         found = []
-        for name, gear, of in zip(("pinion", "wheel"), pair.gears, self.deviations):
-            count = teeth_of(gear, f"Teeth: {name}")
-            if of is not None and of.teeth != count:
-                raise ValueError(f"Teeth: {name} has deviations of {of.teeth} teeth, the gear has {count}")
-            found.append(count)
+        for place, (name, gear, of) in enumerate(zip(_OVER, pair.gears, self.deviations)):
+            known = concrete(gear.teeth)
+            said = [] if self.counts is None else [self.counts[place]]
+            said += [] if of is None else [of.teeth]
+            said += [] if known is None else [int(known)]
+            if not said:
+                raise ValueError(f"Teeth: the number of teeth of the {name} is being traced, give counts=(z1, z2)")
+            if len(set(said)) > 1:
+                raise ValueError(
+                    f"Teeth: {name} has {said[0]} teeth by counts or deviations, {said[-1]} by its gear or deviations"
+                )
+            found.append(said[0])
         return found[0], found[1]
 
     def windows(self, counts: tuple[int, int]) -> int:

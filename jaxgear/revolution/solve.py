@@ -23,7 +23,7 @@ from .teeth import TeethDeviations
 
 Curve = Float[Array, "*batch places"]
 GearName = Literal["pinion", "wheel"]
-GEARS = "pinion", "wheel"
+GEARS: tuple[GearName, GearName] = ("pinion", "wheel")
 # points of contact that are solved together, as for the designs of a sweep: their arrays fit the cache of a CPU
 _SIDE_BY_SIDE = {"cpu": 2**12}
 _SIDE_BY_SIDE_ELSEWHERE = 2**20
@@ -152,7 +152,7 @@ def solve_revolution(
     check_torque("solve_revolution", mesh.support_torque, operating_point.torque)
     flanks = flanks_of("solve_revolution", mesh, pinion, wheel)
     _check_slices(mesh, teeth)
-    counts = teeth.counts(mesh.pair)
+    counts = teeth.counts_of(mesh.pair)
     windows = teeth.windows(counts)
     cycles = _cycles(mesh, operating_point, flanks, teeth.deviations, counts, windows)
     wider = wider_mesh(mesh, cycles.status)

@@ -25,6 +25,7 @@ Pitches = Float[Array, " teeth"]
 _MOST_ORDER = 1e5
 # Reports round to 0.1 um: of so many rounded pitches the sum is off by less than this times the root of their number
 _ROUNDED = 0.1
+_RUN_OUT = 0.9  # F_rT over F_pT, ISO 1328-1:2013, annex on run-out
 
 
 class Undulation(Checked):
@@ -175,7 +176,10 @@ class TeethDeviations(Checked):
             ValueError: for a class or a gear outside the range of the standard.
         """
         limits, draw = ToleranceClass.of(gear, quality_class), distribution or TruncatedNormal()
-        teeth, dtype = teeth_of(gear, "TeethDeviations.drawn"), gear.module.dtype
+        known, dtype = concrete(gear.teeth), gear.module.dtype
+        if known is None:
+            raise ValueError("TeethDeviations.drawn: the number of teeth is being traced, must be concrete")
+        teeth = int(known)
         sizes, phases, single = jax.random.split(key, 3)
         # along the line of action a pitch deviation counts by cos(alpha_t)
         cosine = jnp.cos(gear.transverse_pressure_angle)
@@ -215,19 +219,3 @@ class TeethDeviations(Checked):
             start = 2 * np.pi / self.teeth * order * tooth.astype(order.dtype) + jnp.deg2rad(wave.phase)
             found.append(_Wave(wave.amplitude, direction * order, start, slope))
         return Sum(tuple(found)) if found else NoModification()
-
-
-# F_rT over F_pT, ISO 1328-1:2013, annex on run-out
-_RUN_OUT = 0.9
-
-
-def teeth_of(gear: Gear, owner: str) -> int:
-    """Number of teeth of a gear.
-
-    Raises:
-        ValueError: where it is being traced.
-    """
-    known = concrete(gear.teeth)
-    if known is None:
-        raise ValueError(f"{owner}: the number of teeth is being traced, must be concrete")
-    return int(known)

@@ -18,6 +18,8 @@ from .progress import Progress as Progress
 from .progress import Stages as Stages
 from .results import study_summary as study_summary
 from .results import write_results as write_results
+from .revolution import RevolutionResult as RevolutionResult
+from .revolution import RevolutionStudy as RevolutionStudy
 from .study import AbstractStudy as AbstractStudy
 from .study import AbstractStudyResult as AbstractStudyResult
 from .wear import WearStudy as WearStudy
