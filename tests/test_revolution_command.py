@@ -116,6 +116,8 @@ def test_names_of_quantities_take_the_table(written):
     assert sweep_request(load_design(written(base=sweep))).results[0].settings.over == "pinion"
     with pytest.raises(DesignFileError, match=r'"pinion_side_bands" needs the table \[teeth\]'):
         load_design(written("", base=search))
+    with pytest.raises(DesignFileError, match='"wheel_side_bands" needs whole revolutions of the wheel and'):
+        load_design(written(base=search.replace("pinion_side_bands", "wheel_side_bands")))
 
 
 def test_the_command_says_one_line_without_the_table(written):

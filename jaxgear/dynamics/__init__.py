@@ -27,6 +27,8 @@ from .oscillator import natural_frequencies as natural_frequencies
 from .quantities import DYNAMIC_QUANTITIES as DYNAMIC_QUANTITIES
 from .quantities import mesh_frequency as mesh_frequency
 from .response import SpeedResponse as SpeedResponse
+from .revolution import RevolutionForce as RevolutionForce
+from .revolution import revolution_force as revolution_force
 from .runs import speed_sweeps as speed_sweeps
 from .settings import DOWN as DOWN
 from .settings import KICKED as KICKED

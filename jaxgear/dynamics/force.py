@@ -15,7 +15,7 @@ from ..numerics import Checked, bracketed_root, number, real
 # Doublings of 1 um until a bracket holds the DTE of a force; there is no root where they do not suffice.
 _DOUBLINGS = 40
 # mesh positions over which a stiffness is averaged
-_POSITIONS = 32
+POSITIONS = 32
 # Share of a force by which flanks count as touching, where the deflection under the force is measured from.
 _TOUCHING = 1e-6
 
@@ -35,6 +35,11 @@ class AbstractMeshForce(Checked):
 
     # whether the force jumps at some mesh positions: the ends of an integrator's steps then lie on the step's side
     jumps: ClassVar[bool] = False
+
+    @property
+    def averaged_positions(self) -> int:
+        """Mesh positions over which stiffnesses are averaged."""
+        return POSITIONS
 
     def nodes(self, steps: int) -> Float[Array, " nodes"]:
         """Mesh positions between which an integrator steps, from 0 to 1 [base pitches], shape (steps + 1,)."""
@@ -90,7 +95,7 @@ class AbstractMeshForce(Checked):
 
     def over_cycle(self, of: Callable[[Scalar], Scalar], dtype: np.dtype) -> Scalar:
         """Mean of a function of the mesh position over a cycle, each position for the step about it."""
-        begin = self.nodes(_POSITIONS).astype(dtype)
+        begin = self.nodes(self.averaged_positions).astype(dtype)
         return jnp.sum(jnp.diff(begin) * jax.vmap(of)((begin[:-1] + begin[1:]) / 2))
 
 

@@ -14,6 +14,7 @@ from ..microgeometry import AbstractModification, LeadSlope, ProfileSlope
 from ..numerics import Number
 from ..revolution import Teeth, TeethDeviations, Undulation
 from ..revolution.settings import MOST_WINDOWS
+from ..revolution.solve import GEARS
 from .design_file import DesignFile
 from .errors import DesignFileError, join, naming, referring, refused
 from .flanks import check_flank, flank_of_rows, numbers_of
@@ -88,8 +89,15 @@ class TeethSection(FurtherTable):
         teeth_of(design)
 
     def quantity(self, design: DesignFile, key: str, quantity: Quantity) -> Quantity:
-        """Of a revolution with these teeth."""
-        return quantity.with_settings(teeth_of(design))
+        """Of a revolution with these teeth; orders of a shaft need whole revolutions."""
+        teeth = teeth_of(design)
+        assert teeth.counts is not None
+        for gear, number in zip(GEARS, teeth.counts):
+            whole = teeth.repeats(teeth.counts) and teeth.windows(teeth.counts) % number == 0
+            if quantity.name in (f"{gear}_shaft_order", f"{gear}_side_bands") and not whole:
+                needed = f'whole revolutions of the {gear} and of all gears whose teeth differ: teeth.over = "hunting"'
+                raise DesignFileError(key, f'"{quantity.name}" needs {needed}')
+        return quantity.with_settings(teeth)
 
     @classmethod
     def inner(cls) -> Mapping[str, type[FileTable]]:
@@ -116,7 +124,9 @@ def teeth_of(design: DesignFile) -> Teeth:
         gears = [(name, getattr(section, name)) for name in ("pinion", "wheel")]
         pinion, wheel = (_deviations(design, name, given) for name, given in gears)
         first, second = (round(float(gear.teeth)) for gear in design.pair().gears)
-        return Teeth(pinion, wheel, section.over, (first, second))
+        teeth = Teeth(pinion, wheel, section.over, (first, second))
+        refused("teeth.over", teeth.windows, (first, second))
+        return teeth
 
 
 def _deviations(design: DesignFile, name: str, section: GearTeethSection | None) -> TeethDeviations | None:

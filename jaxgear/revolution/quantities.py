@@ -13,7 +13,7 @@ from jaxtyping import Array, Float
 
 from ..metrics import Analysis, Quantity, Vocabulary
 from ..numerics import maximum, safe_sqrt
-from .orders import over_revolution, shaft_orders, side_bands, tooth_shares, tooth_to_tooth_error, total_composite_error
+from .orders import over_revolution, shaft_orders, side_bands, tooth_to_tooth_error, total_composite_error
 from .settings import Teeth
 from .solve import GearName, Revolution, solve_revolution
 
@@ -32,11 +32,15 @@ def _mesh_order(revolution: Revolution) -> Scalar:
     return _rss(2 * jnp.stack([jnp.mean(error * jnp.cos(turn)), jnp.mean(error * jnp.sin(turn))]))
 
 
+def _largest_share(revolution: Revolution) -> Scalar:
+    share = revolution.pair_share  # of a pair of teeth, which is that of both
+    return maximum(share) if share.shape[-1] else jnp.full((), jnp.nan, share.dtype)
+
+
 def _of_gear(gear: GearName) -> dict[str, Callable[[Revolution], Scalar]]:
     return {
         f"{gear}_shaft_order": lambda revolution: shaft_orders(revolution, gear, 1).amplitude[0],
         f"{gear}_side_bands": lambda revolution: _rss(side_bands(revolution, gear)),
-        f"largest_{gear}_tooth_share": lambda revolution: maximum(tooth_shares(revolution, gear)),
     }
 
 
@@ -47,6 +51,7 @@ OF_REVOLUTION: Mapping[str, Callable[[Revolution], Scalar]] = {
     "mesh_order": _mesh_order,
     **_of_gear("pinion"),
     **_of_gear("wheel"),
+    "largest_tooth_share": _largest_share,
     "max_revolution_pressure": lambda revolution: maximum(over_revolution(revolution, "max_flank_pressure")),
 }
 
@@ -77,7 +82,6 @@ def _quantities_of(gear: GearName) -> tuple[Quantity, ...]:
             "um",
             f"side bands z +- 1 to 3 of the mesh order, {gear}, root of their squares",
         ),
-        _quantity(f"largest_{gear}_tooth_share", "", f"load of the most loaded tooth over the mean one, {gear}"),
     )
 
 
@@ -88,6 +92,9 @@ REVOLUTION_QUANTITIES = Vocabulary(
         _quantity("mesh_order", "um", "transmission error at the mesh order over all teeth, amplitude"),
         *_quantities_of("pinion"),
         *_quantities_of("wheel"),
+        _quantity(
+            "largest_tooth_share", "", "load of the most loaded teeth, over their time in mesh, over the mean one"
+        ),
         _quantity("max_revolution_pressure", "MPa", "largest flank pressure over all teeth", form=".0f"),
     )
 )

@@ -1,6 +1,7 @@
 """Settings: which teeth differ by how much, and over how many base pitches they run."""
 
 from math import lcm
+from typing import Any
 
 import equinox as eqx
 
@@ -9,8 +10,12 @@ from ..metrics import AbstractSettings
 from ..numerics import concrete, whole
 from .teeth import TeethDeviations
 
-MOST_WINDOWS = 1_000_000
+MOST_WINDOWS = 100_000
 _OVER = "pinion", "wheel", "hunting"
+
+
+def _pair(counts: Any) -> Any:
+    return None if counts is None else tuple(int(count) for count in counts)
 
 
 class Teeth(AbstractSettings):
@@ -36,7 +41,7 @@ class Teeth(AbstractSettings):
     pinion: TeethDeviations | None = None
     wheel: TeethDeviations | None = None
     over: str | int | None = eqx.field(static=True, default=None)
-    counts: tuple[int, int] | None = eqx.field(static=True, default=None)
+    counts: tuple[int, int] | None = eqx.field(static=True, default=None, converter=_pair)
 
     def check_together(self) -> None:
         for name, of in (("pinion", self.pinion), ("wheel", self.wheel)):
@@ -48,6 +53,8 @@ class Teeth(AbstractSettings):
             raise ValueError(
                 f'Teeth: over = {self.over!r} must be "pinion", "wheel", "hunting" or a number of base pitches'
             )
+        if self.counts is not None and (len(self.counts) != 2 or min(self.counts) < 1):
+            raise ValueError(f"Teeth: counts = {self.counts} must be two numbers of teeth, of pinion and wheel")
 
     @property
     def deviations(self) -> tuple[TeethDeviations | None, TeethDeviations | None]:
@@ -76,11 +83,22 @@ class Teeth(AbstractSettings):
         return found[0], found[1]
 
     def windows(self, counts: tuple[int, int]) -> int:
-        """Number of base pitches, for numbers of teeth of pinion and wheel."""
+        """Number of base pitches, for numbers of teeth of pinion and wheel.
+
+        Raises:
+            ValueError: where there are too many in the hunting period.
+        """
         over = self.over
         if over is None:
             only = [name for name, of in zip(_OVER, self.deviations) if of is not None]
             over = only[0] if len(only) == 1 else "hunting"
         if isinstance(over, int):
             return over
-        return {"pinion": counts[0], "wheel": counts[1], "hunting": lcm(*counts)}[over]
+        found = {"pinion": counts[0], "wheel": counts[1], "hunting": lcm(*counts)}[over]
+        if found > MOST_WINDOWS:
+            raise ValueError(f"Teeth: over = {over!r} are {found} base pitches, must be at most {MOST_WINDOWS}")
+        return found
+
+    def repeats(self, counts: tuple[int, int]) -> bool:
+        """Whether the gears whose teeth differ make whole revolutions."""
+        return self.windows(counts) % lcm(*(count for count, of in zip(counts, self.deviations) if of is not None)) == 0

@@ -1,7 +1,6 @@
 """Contact over whole revolutions: one window of a base pitch after the other, each with the teeth that are in it."""
 
 from functools import partial, reduce
-from math import lcm
 from operator import add
 from typing import Any, Literal
 
@@ -158,8 +157,7 @@ def solve_revolution(
     wider = wider_mesh(mesh, cycles.status)
     if wider is not None:
         return solve_revolution(wider, operating_point, teeth, pinion=pinion, wheel=wheel)
-    differ = [count for count, of in zip(counts, teeth.deviations) if of is not None]
-    return Revolution(cycles, counts, windows % lcm(*differ) == 0)
+    return Revolution(cycles, counts, teeth.repeats(counts))
 
 
 def _check_slices(mesh: Mesh, teeth: Teeth) -> None:

@@ -1,0 +1,84 @@
+"""The force of a mesh over whole revolutions of gears whose teeth differ."""
+
+from typing import Literal, get_args
+
+import jax.numpy as jnp
+from jaxtyping import Array, Float, PyTree
+
+from ..contact.status import Statuses, WithStatus
+from ..numerics import count
+from ..revolution import Revolution
+from .force import POSITIONS, AbstractMeshForce
+from .force_map import FlankSprings, Tangent
+
+Scalar = Float[Array, ""]
+RevolutionModel = Literal["varying stiffness", "tangent"]
+
+# distance of the coast flanks [um]: none of the teeth is known to touch there
+_FAR = 1e6
+
+
+class RevolutionForce(WithStatus, AbstractMeshForce):
+    """Force of a mesh whose phase counts revolutions: 1 is when all windows of a `Revolution` have passed.
+
+    Oscillators with it therefore take the mesh frequency over `base_pitches`, and as many times the steps of a mesh
+    cycle; their orbits repeat after the windows, and `shaft_orders` takes the DTE of an orbit of even steps.
+
+    Attributes:
+        springs: what it is made of.
+        base_pitches: number of windows.
+    """
+
+    springs: FlankSprings | Tangent
+    base_pitches: int = count()
+
+    @property
+    def status(self) -> Statuses:
+        """Of all contacts."""
+        return self.springs.status
+
+    @property
+    def averaged_positions(self) -> int:
+        """As many in every window as a force of one base pitch has."""
+        return POSITIONS * self.base_pitches
+
+    def at(self, phase: Scalar) -> PyTree[Array]:
+        return self.springs.at(phase)
+
+    def force(self, place: PyTree[Array], dte: Scalar) -> Scalar:
+        springs: AbstractMeshForce = self.springs
+        return springs.force(place, dte)
+
+
+def revolution_force(revolution: Revolution, model: RevolutionModel = "varying stiffness") -> RevolutionForce:
+    """Force of a mesh over the windows of a revolution, for oscillators.
+
+        force = revolution_force(turn)
+        oscillator = torsional(force, mesh.pair, torque, damping_ratio=0.05)
+        start = turn.transmission_error[:1], jnp.zeros(1)
+        orbit = steady_orbit(oscillator, mesh_frequency / turn.windows, start, settle=5, steps=64 * turn.windows)
+        shaft_orders(turn, "pinion", of=orbit.dte)
+
+    Args:
+        revolution: a single one, whose windows repeat.
+        model: as of `mesh_force`; where flanks part, nothing is behind them: coast flanks are left out.
+
+    Raises:
+        ValueError: for another model, or a revolution after which the teeth do not meet as before.
+    """
+    if model not in get_args(RevolutionModel):
+        raise ValueError(f'revolution_force: model = {model!r} must be "varying stiffness" or "tangent"')
+    error, windows = revolution.transmission_error, revolution.windows
+    if error.ndim != 1 or not revolution.repeats:
+        raise ValueError(
+            f"revolution_force: {windows} base pitches are no whole revolutions of all gears whose teeth differ, or "
+            'revolution is a batch: solve one over "hunting"'
+        )
+    first, status = revolution.phase[0] / windows, jnp.max(revolution.status)
+    force = revolution.cycles.force[0]
+    if model == "tangent":
+        return RevolutionForce(Tangent(first, force, error, revolution.tangent_stiffness, status), windows)
+    unloaded = revolution.unloaded_transmission_error
+    start = jnp.stack([unloaded, jnp.full_like(unloaded, _FAR)])
+    stiffness = force / (error - unloaded)
+    return RevolutionForce(FlankSprings(first, start, jnp.stack([stiffness, stiffness]), status), windows)
