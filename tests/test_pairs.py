@@ -33,7 +33,7 @@ def test_traced_gears_take_four():
 
 
 def test_what_the_pairs_have_to_contain_can_be_said():
-    assert jg.prepare(gear_pair(), resolution=SIZE, deflection=70.0).resolution.pairs == 4
+    assert jg.prepare(gear_pair(), resolution=SIZE, deflection=70.0).resolution.pairs == 3
 
 
 def test_next_pairs_count_with_what_is_removed_from_them(mesh):

@@ -54,16 +54,18 @@ def fewest_pairs(pair: GearPair, *, deflection: float = 100.0) -> int:
 
 
 @program
-def _gaps_at(pair: GearPair, reaches: Sequence[tuple[int, int]]) -> Array:
+def _gaps_at(pair: GearPair, reaches: Sequence[float]) -> Array:
     contact = path_of_contact(pair)
     return closing(_next_pairs(pair, contact, jnp.asarray(reaches, jnp.result_type(contact.start))))
 
 
-def _next_pairs(pair: GearPair, contact: PathOfContact, reach: Float[Array, "windows 2"]) -> Contacts:
-    """The first pairs beyond windows of (behind, ahead) base pitches, where they are nearest; shape (windows, 2)."""
-    nearer = _half_overlap(pair)
-    ends = [nearer - reach[:, 0] * contact.base_pitch, reach[:, 1] * contact.base_pitch - nearer]
-    return contacts(pair, contact, jnp.stack(ends, axis=1))
+def _next_pairs(pair: GearPair, contact: PathOfContact, reach: Float[Array, " windows"]) -> Contacts:
+    """The first pairs behind and ahead of windows of so many base pitches either way, where they are nearest.
+
+    Of shape (windows, 2).
+    """
+    end = reach * contact.base_pitch - _half_overlap(pair)
+    return contacts(pair, contact, jnp.stack([-end, end], axis=1))
 
 
 def _half_overlap(pair: GearPair) -> Float[Array, ""]:
@@ -113,9 +115,9 @@ def check_cover(pair: GearPair, contact: PathOfContact, resolution: Resolution) 
     if start is None or end is None or pitch is None or more is None:
         return
     start, end = (start - more) / pitch, (end + more) / pitch
-    behind, ahead = resolution.reach
-    if (end > ahead).any() or (-start > behind).any():
-        needed = max(2 * int(float(end.max()) // 1) + 1, 2 * int(float(-start.min()) // 1) + 2)
+    farthest = max(float(end.max()), float(-start.min()))
+    if farthest > resolution.reach:
+        needed = int(np.ceil(2 * farthest))
         raise ValueError(
             f"Resolution: pairs = {resolution.pairs} must be at least {needed}: the path of contact reaches from "
             f"{float(start.min()):.3g} to {float(end.max()):.3g} base pitches around the pitch point"

@@ -1,7 +1,7 @@
 """A prepared mesh: everything that depends neither on the modification nor on the torque."""
 
 from dataclasses import replace
-from typing import Any
+from typing import Any, TypedDict, Unpack
 
 import equinox as eqx
 import jax
@@ -231,7 +231,8 @@ def prepare(
     if automatic:
         resolution = replace(resolution, pairs=pairs_for(explicit(pair), deflection))
     check_support(support, pair, resolution)
-    mesh = prepare_from(np.zeros(()), pair, compliance, resolution, support, ends_together(pair, compliance))
+    first = np.asarray(resolution.first_phase)
+    mesh = prepare_from(first, pair, compliance, resolution, support, ends_together(pair, compliance))
     check_cover(mesh.pair, mesh.path_of_contact, resolution)
     check_modes(support, resolution)
     return replace(mesh, automatic=True) if automatic else mesh
@@ -343,6 +344,22 @@ def _steps(
     first = edge[..., :1]
     one = jnp.maximum(jnp.abs(first - edge[..., 1:]), 1e-6 * first)
     return jnp.abs(beyond - first) / one
+
+
+class Sizes(TypedDict, total=False):
+    """Of arrays, in place of those of a mesh."""
+
+    positions: int
+    pairs: int
+
+
+def resized(mesh: Mesh, **sizes: Unpack[Sizes]) -> Mesh:
+    """The mesh in other array sizes, with its number of pairs fixed or open as before."""
+    wanted = replace(mesh.resolution, **sizes)
+    if wanted == mesh.resolution:
+        return mesh
+    made = prepare_from(mesh.kinematics.first_phase, mesh.pair, mesh.compliance, wanted, mesh.support, mesh.even)
+    return replace(made, automatic=mesh.automatic)
 
 
 def half_way(mesh: Mesh) -> Mesh:

@@ -23,8 +23,9 @@ class Resolution(Checked):
         positions: mesh positions over one base pitch.
         slices: slices over the common face.
         pairs: tooth pairs carried along; None for as few as the gears and the load need, see `prepare`. Pair i runs at
-            phase + (pairs - 1) // 2 - i base pitches, so four pairs cover two base pitches on either side of the pitch
-            point: contact ratios up to 3.
+            phase + (pairs - 1) // 2 - i base pitches, and mesh positions begin at phase 0, of an odd number of pairs at
+            -1/2: they cover as much on either side of the pitch point, four pairs two base pitches, contact ratios up
+            to 3.
         contact_nodes: points across the contact width at which modifications are averaged; 1 takes the nominal contact
             point alone.
         slide_steps: steps of the contact shift on the slope of a modification; 0 keeps the contact at its nominal
@@ -147,12 +148,17 @@ class Resolution(Checked):
     @property
     def leading(self) -> int:
         """Base pitches by which the first pair leads the reference pair."""
-        return _leading(self.chosen_pairs)
+        return (self.chosen_pairs - 1) // 2
 
     @property
-    def reach(self) -> tuple[int, int]:
-        """Base pitches behind and ahead of the pitch point that the pairs cover."""
+    def reach(self) -> float:
+        """Base pitches on either side of the pitch point that the pairs cover."""
         return reach(self.chosen_pairs)
+
+    @property
+    def first_phase(self) -> float:
+        """Mesh position with which the base pitch begins so that the pairs cover that [base pitches]."""
+        return self.reach - self.leading - 1
 
 
 def end_relief_widths(face_width: Given, length: Given, slices: int = 11) -> tuple[int, ...]:
@@ -195,11 +201,6 @@ def end_relief_widths(face_width: Given, length: Given, slices: int = 11) -> tup
     return made
 
 
-def reach(pairs: int) -> tuple[int, int]:
-    """Base pitches behind and ahead of the pitch point that a number of pairs covers."""
-    ahead = _leading(pairs) + 1
-    return pairs - ahead, ahead
-
-
-def _leading(pairs: int) -> int:
-    return (pairs - 1) // 2
+def reach(pairs: int) -> float:
+    """Base pitches on either side of the pitch point that a number of pairs covers."""
+    return 0.5 * pairs

@@ -28,7 +28,7 @@ from ..numerics import (
 from ..numerics.programs import begin
 from .cycle import MeshCycle
 from .face_coupling import check_torque, ends_together, holds_at
-from .mesh import Mesh, begin_mesh, prepare
+from .mesh import Mesh, begin_mesh, resized
 from .operating_point import OperatingPoint, Torque, operating_point_of
 from .resolution import Resolution
 from .slide import Own, RemovedMaterial, as_removed, for_contact, loaded_material, nothing_removed
@@ -232,12 +232,10 @@ def _cycle(mesh: Mesh, operating_point: OperatingPoint, contact: dict[str, Any],
 
 
 def wider_mesh(mesh: Mesh, status: Statuses) -> Mesh | None:
-    """The mesh with more pairs, where their number was left open, is too small and can be known."""
+    """The mesh at the same positions with more pairs, where their number was open, is too small and can be known."""
     if not more_pairs_help(mesh, status):
         return None
-    sizes = replace(mesh.resolution, pairs=mesh.resolution.chosen_pairs + 1)
-    wider = prepare(mesh.pair, compliance=mesh.compliance, resolution=sizes, support=mesh.support)
-    return replace(wider, automatic=True)
+    return resized(mesh, pairs=mesh.resolution.chosen_pairs + 1)
 
 
 def more_pairs_help(mesh: Mesh, status: Statuses) -> bool:

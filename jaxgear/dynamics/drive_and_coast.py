@@ -106,9 +106,10 @@ def _coast_phase(mesh: Mesh):
     secant = 1 / jnp.cos(pair.working_pressure_angle)
     thickness = [tooth_thickness(gear, 2 * gear.base_radius * secant) for gear in (pair.pinion, pair.wheel)]
     middle = 0.5 + (thickness[0] - thickness[1]) / (2 * pair.base_pitch * secant)
-    places = (middle - mesh.kinematics.first_phase) * count
+    first = mesh.resolution.first_phase
+    places = (middle - mesh.kinematics.first_phase - first) * count
     shift = jnp.floor(places)
-    return (places - shift) / count, shift.astype(int), mesh.margins.backlash
+    return first + (places - shift) / count, shift.astype(int), mesh.margins.backlash
 
 
 def static(flanks: Flanks, torque: Scalar, compliance: Scalar) -> Static:

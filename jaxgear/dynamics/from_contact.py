@@ -1,8 +1,7 @@
 """Mesh forces of a prepared mesh: the map of its contact, and simpler models of it."""
 
 from collections.abc import Callable
-from dataclasses import replace
-from typing import Any, Literal, TypedDict, Unpack, get_args
+from typing import Any, Literal, get_args
 
 import equinox as eqx
 import jax
@@ -10,7 +9,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..contact import Mesh
-from ..contact.mesh import prepare_from
+from ..contact.mesh import resized
 from ..contact.operating_point import Torque, operating_point_of
 from ..contact.solve import check_mesh, more_pairs_help
 from ..contact.status import Status, status_of
@@ -116,22 +115,6 @@ def force_and_mesh(
         mesh = resized(mesh, pairs=mesh.resolution.chosen_pairs + 1)
         made = _made(mesh, torque, both, _besides(deviation, given, mesh), model, levels, farthest, series)
     return made, mesh
-
-
-class Sizes(TypedDict, total=False):
-    """Of arrays, in place of those of a mesh."""
-
-    positions: int
-    pairs: int
-
-
-def resized(mesh: Mesh, **sizes: Unpack[Sizes]) -> Mesh:
-    """The mesh in other array sizes, with its number of pairs fixed or open as before."""
-    wanted = replace(mesh.resolution, **sizes)
-    if wanted == mesh.resolution:
-        return mesh
-    made = prepare_from(mesh.kinematics.first_phase, mesh.pair, mesh.compliance, wanted, mesh.support, mesh.even)
-    return replace(made, automatic=mesh.automatic)
 
 
 def interpolated(deviation: Given, of: Mesh, mesh: Mesh) -> Float[Array, "pairs slices positions"]:

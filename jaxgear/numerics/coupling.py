@@ -173,7 +173,13 @@ def _block_inverse(matrix: Blocks) -> Blocks:
     return -jax.lax.fori_loop(0, len(matrix), sweep, matrix)
 
 
-# Sums over few terms rather than products of matrices: compilers fuse them, and turn no array around for them.
+# Sums over few terms, one by one, rather than products of matrices and reductions of an axis: compilers fuse them into
+# one loop over the positions, and turn no array around for them.
+
+
+def summed(rows: Float[Array, "..."], axis: int = 0) -> Float[Array, "..."]:
+    """The sum over a short axis."""
+    return reduce(add, jnp.unstack(rows, axis=axis))
 
 
 def onto(
@@ -314,10 +320,10 @@ def _of_support(
         return list(even[:, None]), reduce(add, list(even[0] * lever))[None, None]
     heights = over_slices(lever)
     shapes = _constant(coupling) if shapes is None else shapes
-    pressed = jnp.stack([sum(x * height for x, height in zip(row, heights)) for row in inverse])
-    modal_pressed = jnp.stack(coupling.scaled(list(pressed)))
+    pressed = [sum(x * height for x, height in zip(row, heights)) for row in inverse]
+    modal_pressed = jnp.stack(coupling.scaled(pressed))
     right = [onto(mode[:, None] * shapes, modal_pressed) for mode in coupling.modes.T]
-    force = jnp.sum(pressed * heights, axis=0)
+    force = sum(row * height for row, height in zip(pressed, heights))
     return right, jnp.stack([onto(shape[:, None] * shapes, force) for shape in shapes.T])
 
 
@@ -339,7 +345,7 @@ def _joined(
     first: list[Sides], second: list[Float[Array, "others pairs positions"]]
 ) -> Float[Array, "sides others positions"]:
     """Sum over modes and springs."""
-    return reduce(add, [jnp.sum(a[:, None] * b[None], axis=2) for a, b in zip(first, second)])
+    return reduce(add, [summed(a[:, None] * b[None], 2) for a, b in zip(first, second)])
 
 
 def _back(
@@ -350,7 +356,7 @@ def _back(
     for mode in reversed(range(len(blocks))):
         value = divided[mode]
         for later in range(mode + 1, len(blocks)):
-            value = value - jnp.sum(blocks[mode].lower[later - mode] * found[later][:, None], axis=0)
+            value = value - summed(blocks[mode].lower[later - mode] * found[later][:, None])
         found[mode] = value / unit(blocks[mode].inverse[0])
     return [found[mode] for mode in range(len(blocks))]
 
@@ -377,7 +383,7 @@ def respond(
     carried = onto(shapes, force) - _joined(factors.bent[0], divided)[:, 0]
     mean = weight[0] if coupling.weight is None else weight[0] / coupling.weight[0]
     bends, approach = _bends(factors, carried, None if load is None else load / mean, approach)
-    eliminated = [a[0] + jnp.sum(b * bends[:, None], axis=0) for a, b in zip(divided, factors.bent[1])]
+    eliminated = [a[0] + summed(b * bends[:, None]) for a, b in zip(divided, factors.bent[1])]
     deflected = along(coupling.modes, jnp.stack(_back(factors.blocks, eliminated)))
     even = along(shapes, bends)
     yielded = coupling.scaled([deflected[:, i] for i in range(len(heights))])
@@ -397,7 +403,7 @@ def _constant(coupling: SliceCoupling) -> Float[Array, "slices 1"]:
 
 def stiffness(weight: Float[Array, " slices"], factors: CoupledFactors) -> Curve:
     """Load per unit of approach."""
-    return jnp.sum(weight) * jnp.sum(factors.force[0] * factors.yielding[:, 0], axis=0)
+    return jnp.sum(weight) * summed(factors.force[0] * factors.yielding[:, 0])
 
 
 def _bends(factors: CoupledFactors, carried: Bends, total, approach: Curve | None) -> tuple[Bends, Curve]:
@@ -405,8 +411,8 @@ def _bends(factors: CoupledFactors, carried: Bends, total, approach: Curve | Non
     root = factors.coupling.modes.shape[0] ** 0.5
     still, rise = _still(factors, carried), factors.yielding[:, 0]
     if approach is None:
-        missing = total / root - carried[0] - jnp.sum(factors.force[0] * still, axis=0)
-        approach = missing / (root * jnp.sum(factors.force[0] * rise, axis=0))
+        missing = total / root - carried[0] - summed(factors.force[0] * still)
+        approach = missing / (root * summed(factors.force[0] * rise))
     return still + root * approach[None] * rise, approach
 
 
@@ -416,7 +422,7 @@ def _still(factors: CoupledFactors, carried: Bends) -> Bends:
     if support is None:
         return jnp.zeros_like(carried)
     bent = jnp.tensordot(support, carried, 1)
-    return -jnp.sum(factors.yielding * bent[None], axis=1)
+    return -summed(factors.yielding * bent[None], 1)
 
 
 def _yielding(support: Float[Array, "bends bends"] | None, force: Float[Array, "bends bends positions"]):

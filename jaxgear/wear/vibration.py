@@ -7,8 +7,9 @@ import jax
 from jaxtyping import Array, Float
 
 from ..contact import Mesh, OperatingPoint
+from ..contact.mesh import resized
 from ..dynamics import Dynamics, mesh_frequency, steps_for
-from ..dynamics.from_contact import interpolated, resized
+from ..dynamics.from_contact import interpolated
 from ..dynamics.steady import SteadyForce
 from ..microgeometry import AbstractModification
 from ..numerics import check
