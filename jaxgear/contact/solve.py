@@ -285,7 +285,8 @@ def _solved(mesh: Mesh, problem: ContactProblem) -> ContactSolution:
     gap = (leaning[:, None] * by_load * total[None])[None]
     upright = replace(coupling, support_modes=None, support=None, crosswise=False)
     found = solve(replace(problem, gap=stored(problem.gap + problem.levers * gap), coupling=upright))
-    moment = jnp.sum(leaning[:, None] * coupling.weighted(jnp.sum(problem.levers * found.line_load, axis=0)), axis=0)
+    force = sum(lever * q for lever, q in zip(problem.levers, found.line_load))
+    moment = jnp.sum(leaning[:, None] * coupling.weighted(force), axis=0)
     return replace(found, approach=found.approach + by_load * moment)
 
 

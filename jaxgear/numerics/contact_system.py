@@ -122,5 +122,5 @@ def without_gap(problem: ContactProblem, load: Rows, approach: Curve) -> Rows:
 def total(problem: ContactProblem, load: Rows) -> Curve:
     """The load that line loads make."""
     if problem.lever.ndim == 3:
-        return jnp.sum(problem.weight[None, :, None] * problem.lever * jnp.stack(load), axis=(0, 1))
+        return jnp.sum(problem.weight[:, None] * sum(lever * q for lever, q in zip(problem.lever, load)), axis=0)
     return sum(lever * jnp.sum(problem.weight[:, None] * q, axis=0) for lever, q in zip(problem.lever, load))

@@ -210,12 +210,12 @@ class _Block(NamedTuple):
 
     Attributes:
         scaled: L D.
-        lower: L.
+        lower: L, below the diagonal.
         inverse: of D.
     """
 
     scaled: Float[Array, "modes pairs pairs positions"]
-    lower: Float[Array, "modes pairs pairs positions"]
+    lower: Float[Array, "below pairs pairs positions"]
     inverse: Float[Array, "pairs pairs positions"]
 
 
@@ -295,10 +295,10 @@ def _eliminated(coupling: SliceCoupling, modal: list[Float[Array, "_ pairs pairs
         scaled = modal[mode] + held.column(mode)
         for before, block in enumerate(blocks):
             ahead = mode - before
-            scaled = scaled - _times(block.lower[ahead:], jnp.swapaxes(block.scaled[ahead], 0, 1))
+            scaled = scaled - _times(block.lower[ahead - 1 :], jnp.swapaxes(block.scaled[ahead], 0, 1))
         scaled = scaled / unit(scaled)
         inverse = small_inverse(scaled[0])
-        lower = _times(scaled, inverse)
+        lower = _times(scaled[1:], inverse)
         blocks.append(_Block(scaled, lower / unit(lower), inverse))
     return blocks
 
@@ -356,7 +356,7 @@ def _back(
     for mode in reversed(range(len(blocks))):
         value = divided[mode]
         for later in range(mode + 1, len(blocks)):
-            value = value - summed(blocks[mode].lower[later - mode] * found[later][:, None])
+            value = value - summed(blocks[mode].lower[later - mode - 1] * found[later][:, None])
         found[mode] = value / unit(blocks[mode].inverse[0])
     return [found[mode] for mode in range(len(blocks))]
 
