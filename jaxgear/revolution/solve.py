@@ -124,7 +124,7 @@ def solve_revolution(
 ) -> Revolution:
     """Loaded tooth contact over whole revolutions of gears whose teeth differ.
 
-    Window k is the base pitch in which the mesh position runs from k to k + 1; pair n is tooth n mod z1 of the pinion
+    Window k is the base pitch that lies k base pitches after that of the mesh; pair n is tooth n mod z1 of the pinion
     on tooth n mod z2 of the wheel. Each window is a contact problem of its own, solved as by `solve` for the material
     that modifications and deviations of its teeth remove together. Only few windows are in memory at a time; reverse
     mode works them out again.
