@@ -242,6 +242,17 @@ def test_what_is_refused(make, message):
 
 
 @pytest.mark.slow
+def test_teeth_that_are_far_apart_take_more_pairs():
+    open_pairs = jg.prepare(mesh().pair, resolution=replace(SLIDING, pairs=None))
+    teeth = of_wheel(300.0 * (np.arange(Z2) % 2))
+    found = solve_revolution(open_pairs, TORQUE, teeth)
+    many = solve_revolution(jg.prepare(mesh().pair, resolution=replace(SLIDING, pairs=6)), TORQUE, teeth)
+    assert found.cycles.pair_force.shape[1] > 2 and bool(found.converged.all())
+    np.testing.assert_allclose(found.transmission_error, many.transmission_error, atol=1e-9)
+    assert not bool(solve_revolution(mesh(), TORQUE, teeth).converged.all())  # two pairs are said to be too few
+
+
+@pytest.mark.slow
 def test_waves_of_helical_gears_run_along_their_contact_lines():
     """Every slice meets a wave at the same height, so that rigid teeth follow it whole; so do loaded ones."""
     lines = jg.prepare(helical_pairs.pair_of(), resolution=helical_pairs.SIZES)

@@ -21,7 +21,8 @@ def _pair(counts: Any) -> Any:
 class Teeth(AbstractSettings):
     """Deviations of the teeth of both gears, and the base pitches over which the pair is solved.
 
-    `quantity` gives with it the numbers of a revolution, `REVOLUTION_QUANTITIES`.
+    `quantity` gives with it the numbers of a revolution, `REVOLUTION_QUANTITIES`. Deviations of manufactured gears in
+    searches and sweeps do not change them: these teeth have their own.
 
     Attributes:
         pinion, wheel: deviations of the teeth; None for equal teeth.

@@ -1,5 +1,6 @@
 """Contact over whole revolutions: one window of a base pitch after the other, each with the teeth that are in it."""
 
+from dataclasses import fields
 from functools import partial, reduce
 from operator import add
 from typing import Any, Literal
@@ -9,23 +10,21 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float, Int
 
-from ..contact import Mesh, MeshCycle, solve_removed
+from ..conditions.join import side_by_side
+from ..contact import Kinematics, Mesh, MeshCycle, solve_removed
 from ..contact.face_coupling import check_torque
 from ..contact.operating_point import OperatingPoint, Torque, operating_point_of
 from ..contact.solve import check_mesh, flanks_of, material_of, outermost, wider_mesh
 from ..contact.status import Status, WithStatus, status_of
-from ..geometry import Gear
+from ..geometry import Gear, Margins
 from ..microgeometry import AbstractModification, terms
-from ..numerics import changed, kernel
+from ..numerics import kernel, program
 from .settings import Teeth
 from .teeth import TeethDeviations
 
 Curve = Float[Array, "*batch places"]
 GearName = Literal["pinion", "wheel"]
 GEARS: tuple[GearName, GearName] = ("pinion", "wheel")
-# points of contact that are solved together, as for the designs of a sweep: their arrays fit the cache of a CPU
-_SIDE_BY_SIDE = {"cpu": 2**12}
-_SIDE_BY_SIDE_ELSEWHERE = 2**20
 
 
 class Revolution(WithStatus, eqx.Module):
@@ -153,11 +152,11 @@ def solve_revolution(
     _check_slices(mesh, teeth)
     counts = teeth.counts_of(mesh.pair)
     windows = teeth.windows(counts)
-    cycles = _cycles(mesh, operating_point, flanks, teeth.deviations, counts, windows)
-    wider = wider_mesh(mesh, cycles.status)
+    found: dict[str, Any] = _contacts(mesh, operating_point, flanks, teeth.deviations, counts, windows)
+    wider = wider_mesh(mesh, found["status"])
     if wider is not None:
         return solve_revolution(wider, operating_point, teeth, pinion=pinion, wheel=wheel)
-    return Revolution(cycles, counts, teeth.repeats(counts))
+    return Revolution(_cycles(mesh.kinematics, mesh.margins, operating_point, found), counts, teeth.repeats(counts))
 
 
 def _check_slices(mesh: Mesh, teeth: Teeth) -> None:
@@ -180,11 +179,22 @@ Flanks = tuple[AbstractModification, AbstractModification]
 Deviations = tuple[TeethDeviations | None, TeethDeviations | None]
 
 
+# fields of a mesh cycle that do not differ between windows
+_COMMON = "kinematics", "margins", "operating_point", "pinion", "wheel"
+_CONTACT = tuple(field.name for field in fields(MeshCycle) if field.name not in _COMMON)
+
+
+@program
+def _cycles(kinematics: Kinematics, margins: Margins, at: OperatingPoint, found: dict[str, Any]) -> MeshCycle:
+    """The cycles of all windows, each with what they have in common."""
+    return jax.vmap(lambda each: MeshCycle(kinematics, margins, at, None, None, **each))(found)
+
+
 @kernel
-def _cycles(
+def _contacts(
     mesh: Mesh, at: OperatingPoint, flanks: Flanks, deviations: Deviations, counts: tuple[int, int], windows: int
-) -> MeshCycle:
-    """The cycles of all windows."""
+) -> dict[str, Array]:
+    """What differs between the cycles of the windows."""
     dtype, sizes = mesh.slice_width.dtype, mesh.resolution
     deviations = jax.tree.map(lambda leaf: leaf.astype(dtype) if eqx.is_inexact_array(leaf) else leaf, deviations)
     # without teeth of their own shape the material is the same in all windows, but for a displacement of every pair
@@ -192,7 +202,7 @@ def _cycles(
     design = material_of(mesh, at.torque, *flanks) if alike else None
 
     @partial(jax.checkpoint, prevent_cse=False)
-    def cycle(window: Int[Array, ""]) -> MeshCycle:
+    def cycle(window: Int[Array, ""]) -> dict[str, Array]:
         # with the pairs before and behind those of the window
         numbers = window - sizes.leading + jnp.arange(-1, sizes.chosen_pairs + 1)
         pitch = _displacement(mesh, deviations, counts, numbers)
@@ -202,11 +212,13 @@ def _cycles(
             removed = material_of(mesh, at.torque, *flanks, own)
         removed = removed + pitch[1:-1, None, None]
         found = solve_removed(mesh, at, removed)
-        return changed(found, status=_status(mesh, found, removed, pitch))
+        return {**{name: getattr(found, name) for name in _CONTACT}, "status": _status(mesh, found, removed, pitch)}
 
-    points = sizes.positions * sizes.slices
-    size = _SIDE_BY_SIDE.get(jax.default_backend(), _SIDE_BY_SIDE_ELSEWHERE)
-    return jax.lax.map(cycle, jnp.arange(windows), batch_size=min(max(size // points, 1), windows))
+    batches = -(-windows // side_by_side(mesh))
+    size = -(-windows // batches)
+    # whole batches only: a rest would be a program of its own, which takes as long to compile
+    found = jax.lax.map(cycle, jnp.arange(batches * size), batch_size=size)
+    return jax.tree.map(lambda part: part[:windows], found)
 
 
 def _displacement(mesh: Mesh, deviations: Deviations, counts: tuple[int, int], numbers: Array) -> Float[Array, " n"]:

@@ -46,12 +46,12 @@ class Undulation(Checked):
     phase: Scalar = number("deg", default=0.0)
 
 
-class _Wave(AbstractModification):
-    """An `Undulation` on one tooth: a cos(turns (rho - slope y) / r_b + start)."""
+class _Waves(AbstractModification):
+    """Every `Undulation` of a gear on one tooth: sum of a cos(turns (rho - slope y) / r_b + start)."""
 
-    amplitude: Scalar = number("um")
-    turns: Scalar = number("")
-    start: Scalar = number("rad")
+    amplitude: Float[Array, " waves"] = number("um", shape=("waves",))
+    turns: Float[Array, " waves"] = number("", shape=("waves",))
+    start: Float[Array, " waves"] = number("rad", shape=("waves",))
     slope: Scalar | None = number("", optional=True, default=None)
 
     @property
@@ -62,7 +62,11 @@ class _Wave(AbstractModification):
         rolled = flank.roll_length
         if self.slope is not None:
             rolled = rolled - self.slope * flank.face_coordinate
-        return self.amplitude * jnp.cos(self.turns * rolled / flank.base_radius + self.start)
+        rolled = (rolled / flank.base_radius)[..., None]
+        amplitude, turns, start = (
+            each.reshape((1,) * (rolled.ndim - 1) + (-1,)) for each in (self.amplitude, self.turns, self.start)
+        )
+        return jnp.sum(amplitude * jnp.cos(turns * rolled + start), axis=-1)
 
 
 def _stacked(flanks: Any) -> Any:
@@ -213,9 +217,12 @@ class TeethDeviations(Checked):
         found: list[AbstractModification] = []
         if self.flanks is not None:
             found += terms(jax.tree.map(lambda leaf: leaf[tooth], self.flanks))
-        slope = None if gear.is_spur else jnp.tan(gear.base_helix_angle)
-        for wave in self.undulations:
-            order = wave.order.astype(wave.phase.dtype)
-            start = 2 * np.pi / self.teeth * order * tooth.astype(order.dtype) + jnp.deg2rad(wave.phase)
-            found.append(_Wave(wave.amplitude, direction * order, start, slope))
+        if self.undulations:
+            slope = None if gear.is_spur else jnp.tan(gear.base_helix_angle)
+            amplitude, order, phase = (
+                jnp.stack([getattr(wave, name) for wave in self.undulations])
+                for name in ("amplitude", "order", "phase")
+            )
+            start = 2 * np.pi / self.teeth * order * tooth.astype(order.dtype) + jnp.deg2rad(phase)
+            found.append(_Waves(amplitude, direction * order, start, slope))
         return Sum(tuple(found)) if found else NoModification()

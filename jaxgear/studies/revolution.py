@@ -48,6 +48,11 @@ class RevolutionStudy(AbstractStudy["RevolutionResult"]):
         """As `AbstractStudy.of`."""
         return cls(design, quick, teeth_of(design), search_of(design, quick=quick))
 
+    def omits(self) -> str:
+        """The limits of [tolerance]: the teeth have deviations of their own."""
+        stands = "tolerance" in self.design.tables
+        return "[tolerance] is not part of this analysis, the teeth have the deviations of [teeth]" * stands
+
     def work_out(self, checkpoints: Checkpoints, stages: Stages) -> "RevolutionResult":
         """The revolutions of all designs at the torque of the file."""
         design, found = self.design, {}
