@@ -95,13 +95,22 @@ def test_a_measured_flank_of_every_tooth(written):
         ('[teeth.pinion]\nfile = "none.csv"', "teeth.pinion.file: none.csv: No such file or directory"),
         ('[teeth.pinion]\nfile = "other.csv"', "teeth.pinion.file: other.csv: has no column pitch_um, single_pitch_um"),
         ('[teeth.pinion]\nfile = "letters.csv"', 'letters.csv: pitch_um of point 2 is "x", must be a number'),
+        (
+            '[teeth.pinion]\nfile = "metres.csv"',
+            "has pitch_um within 0.005 um, less than flanks can be measured to: is it",
+        ),
         ('[teeth.pinion]\nfile = "order.csv"', "order.csv: has the column tooth, must count 0, 1, 2"),
         ('[teeth.pinion]\nflanks = "other.csv"', "teeth.pinion.flanks: other.csv: has no column tooth, must have one"),
         ('[teeth.wheel]\nflanks = "flanks.csv"', "flanks.csv: has flanks of 19 teeth, must have 48"),
     ],
 )
 def test_what_is_refused(written, teeth, message):
-    files = {"flanks": FLANKS, "other": "depth_um\n1.0", "letters": "pitch_um\n1.0\nx"}
+    files = {
+        "flanks": FLANKS,
+        "other": "depth_um\n1.0",
+        "letters": "pitch_um\n1.0\nx",
+        "metres": "pitch_um\n0.005\n0.0",
+    }
     path = written(teeth, **files, order="tooth,pitch_um\n1,0.0\n3,0.0")
     with pytest.raises(DesignFileError) as refused:
         load_design(path)

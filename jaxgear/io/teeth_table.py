@@ -11,6 +11,7 @@ import numpy as np
 
 from ..metrics import Quantity
 from ..microgeometry import AbstractModification, LeadSlope, ProfileSlope
+from ..microgeometry.base import AMOUNTS
 from ..numerics import Number
 from ..revolution import Teeth, TeethDeviations, Undulation
 from ..revolution.settings import MOST_WINDOWS
@@ -176,7 +177,11 @@ def _lists(design: DesignFile, section: GearTeethSection) -> dict[str, Any]:
             numbers = numbers_of(rows, _TOOTH)
             if numbers[0] not in (0, 1) or (np.diff(numbers) != 1).any():
                 raise DesignFileError("", "has the column tooth, must count 0, 1, 2 ... or 1, 2, 3 ... from row to row")
-        return found | {key: numbers_of(rows, column) for key, column in columns.items()}
+        read = {key: numbers_of(rows, column) for key, column in columns.items()}
+        for key, values in read.items():
+            if 0 < (largest := float(abs(values).max())) < AMOUNTS.low:
+                raise DesignFileError("", f"has {columns[key]} within {largest:.3g} um, {AMOUNTS.remark}")
+        return found | read
 
 
 def _measured(design: DesignFile, name: str, section: GearTeethSection) -> AbstractModification:
