@@ -42,6 +42,7 @@ def test_the_table_is_read(written):
     teeth = teeth_of(load_design(written()))
     assert (teeth.over, teeth.counts, teeth.wheel) == ("pinion", (19, 48), None)
     np.testing.assert_allclose(teeth.pinion.pitch, 5.0 * (np.arange(19) % 2 == 0) * (np.arange(19) < 18), atol=1e-9)
+    assert teeth_of(load_design(written(TEETH.replace('"pinion"', "30")))).over == 30
     assert [(float(wave.amplitude), float(wave.order)) for wave in teeth.pinion.undulations] == [(4.0, 1.0)]
 
 
@@ -79,6 +80,8 @@ def test_a_measured_flank_of_every_tooth(written):
             "[teeth]\nover = 'never'\n[teeth.wheel]",
             'teeth.over: "never" is not known, must be one',
         ),
+        ("[teeth]\nover = 0\n[teeth.wheel]", "teeth.over: 0 must be at least 1 and at most 100000"),
+        ("[teeth]\nover = [1]\n[teeth.wheel]", "teeth.over: must be a whole number, not a list"),
         ("[teeth.wheel]\npitch = [1.0]", "teeth.wheel.pitch: has 1 numbers, the gear has 48 teeth"),
         ("[teeth.wheel]\nrun_out = -1.0", "teeth.wheel.run_out: -1 um must be greater than 0 um"),
         ("[teeth.wheel]\nseed = 1", "teeth.wheel.seed: has no effect without quality_class"),

@@ -22,8 +22,14 @@ from .flanks import check_flank, flank_of_rows, numbers_of
 from .rows import read_rows
 from .table_keys import FileTable, built, entry, nested, section_of
 from .tables import FurtherTable
-from .value_types import QUALITY_CLASS, SEED, choice, count, either, list_of, positive, real, text
+from .value_types import QUALITY_CLASS, SEED, Kind, choice, count, list_of, positive, real, text
 
+_GEAR, _COUNT = choice("pinion", "wheel", "hunting"), count(1, MOST_WINDOWS)
+_OVER = Kind(
+    '"pinion", "wheel", "hunting" or a number of base pitches',
+    lambda key, value: (_GEAR if isinstance(value, str) else _COUNT).read(key, value),
+    _COUNT.number,
+)
 _AMOUNTS = list_of(real(Number("um")))
 _TOOTH = "tooth"
 _LISTS = "pitch", "single_pitch", "profile_slope", "helix_slope"  # keys, and columns with the unit
@@ -77,13 +83,7 @@ class TeethSection(FurtherTable):
 
     pinion: GearTeethSection | None = entry(nested(GearTeethSection))
     wheel: GearTeethSection | None = entry(nested(GearTeethSection))
-    over: str | int | None = entry(
-        either(
-            choice("pinion", "wheel", "hunting"),
-            count(1, MOST_WINDOWS),
-            '"pinion", "wheel", "hunting" or a number of base pitches',
-        )
-    )
+    over: str | int | None = entry(_OVER)
 
     def check(self, design: DesignFile) -> None:
         """As a study does."""
