@@ -143,6 +143,7 @@ def test_waves_around_a_gear_are_lines_at_their_order(order, name):
     assert lines[name].pinion_order == pytest.approx(order * Z1 / Z2)
 
 
+@pytest.mark.slow
 def test_the_gradient_of_side_bands_by_a_relief_is_the_central_difference():
     teeth = of_wheel(10.0 * np.cos(2 * np.pi * np.arange(Z2) / Z2))
 
