@@ -28,6 +28,7 @@ import jaxgear as jg
 from jaxgear import plot
 from jaxgear.cli import app, cache, main, run
 from jaxgear.contact.status import Status
+from jaxgear.dynamics.mesh_tables import FILES
 from jaxgear.io import load_design, optimize_request
 from jaxgear.io.folder import RESULT_FILES, result_folder
 from jaxgear.io.optimize_table import METHODS_WITHOUT_VARIABLES
@@ -338,6 +339,7 @@ def test_all_result_files_are_there(folder, analyzed, optimized, iterated):
     of_others |= {"ppte_over_life.png", "depth_over_life.png", "dynamic_factor_over_life.png"}  # of `jaxgear wear`
     of_others |= {"life_ppte_distribution.png"}
     of_others |= {"revolution.csv", "revolution.png", "orders.csv", "orders.png"}  # of `jaxgear revolution`
+    of_others |= set(FILES)  # of `jaxgear export`
     assert {path.name for path in target.iterdir()} == RESULT_FILES - of_others
     for other in (optimized.target, folder / "analyzed"):
         assert {path.name for path in other.iterdir()} == {"summary.json", "flanks.csv", "report.html"}

@@ -12,6 +12,8 @@ from .force_map import FlankSprings as FlankSprings
 from .force_map import ForceMap as ForceMap
 from .force_map import Tangent as Tangent
 from .from_contact import mesh_force as mesh_force
+from .mesh_tables import MeshTables as MeshTables
+from .mesh_tables import mesh_tables as mesh_tables
 from .motion import Motion as Motion
 from .motion import RunUp as RunUp
 from .motion import motion as motion

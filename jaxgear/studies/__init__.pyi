@@ -11,6 +11,8 @@ from .dynamics import DynamicsStudy as DynamicsStudy
 from .dynamics_result import DynamicsResult as DynamicsResult
 from .evaluation import Evaluation as Evaluation
 from .evaluation import evaluate as evaluate
+from .export import ExportResult as ExportResult
+from .export import ExportStudy as ExportStudy
 from .layout import LayoutStudy as LayoutStudy
 from .layout_result import LayoutResult as LayoutResult
 from .optimization import DesignOptimization as DesignOptimization

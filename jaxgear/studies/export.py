@@ -1,0 +1,118 @@
+"""The study of an export: from a design file to tables for programs of rotor and multibody dynamics."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, ClassVar, Self
+
+import numpy as np
+
+from ..contact.status import reason
+from ..dynamics.mesh_tables import FILES, MeshTables, mesh_tables
+from ..io import DesignFile, OptimizeRequest
+from ..numerics import changed
+from ..report import Table
+from .checkpoints import Checkpoints
+from .comparison import Modifications, compared, search_of
+from .evaluation import torques_of
+from .progress import Stages
+from .study import AbstractStudy, AbstractStudyResult
+from .summary_data import flanks_data
+
+_QUICK_POSITIONS = 64  # of the force map
+
+
+@dataclass(frozen=True)
+class ExportStudy(AbstractStudy["ExportResult"]):
+    """Write mesh stiffness, transmission error and mesh force as files for rotor and multibody programs.
+
+    Those of the modification of the design file, of the optimum of its variables, or of the unmodified pair: stiffness
+    and transmission error over phase and torque, orders of the transmission error, force over phase and dynamic
+    transmission error, as CSV and all as mesh.npz. Units, signs and axes stand in the files.
+
+    Attributes:
+        search: for the optimum of the file; None where its modifications are numbers.
+    """
+
+    name: ClassVar = "export"
+
+    search: OptimizeRequest | None
+
+    @classmethod
+    def of(cls, design: DesignFile, *, quick: bool = False) -> Self:
+        """As `AbstractStudy.of`."""
+        return cls(design, quick, search_of(design, quick=quick))
+
+    def work_out(self, checkpoints: Checkpoints, stages: Stages) -> "ExportResult":
+        """The tables over the torques of the file."""
+        design = self.design
+        mesh, designs = compared(
+            design, max(torques_of(design, quick=True)), self.search, checkpoints, stages, quick=self.quick
+        )
+        mesh = changed(mesh, automatic=design.takes_more_pairs)
+        name = next(name for name in ("optimum", "modified", "unmodified") if name in designs)
+        pinion, wheel = designs[name]
+        stages.begin(f"tables of the {name} design")
+        sizes = {"positions": _QUICK_POSITIONS} if self.quick else {}
+        torques = torques_of(design, quick=self.quick)
+        tables = mesh_tables(mesh, design.torque, torques, pinion=pinion, wheel=wheel, **sizes)
+        return ExportResult(design, name, designs[name], tables)
+
+
+@dataclass(frozen=True)
+class ExportResult(AbstractStudyResult):
+    """Tables of one design.
+
+    Attributes:
+        design: the design file.
+        name: of the design.
+        flanks: its modifications (pinion, wheel).
+        mesh: its tables.
+    """
+
+    assumptions: ClassVar = ("The mesh force is quasi-static and made for the torque of the design file.",)
+
+    design: DesignFile
+    name: str
+    flanks: Modifications
+    mesh: MeshTables
+
+    def tables(self) -> list[Table]:
+        """Numbers at the torque of the file and at both ends of its range."""
+        header = "torque\n[N m]", "mean TE\n[um]", "PPTE\n[um]", "mesh order\n[um]", "mean stiffness\n[N/um]"
+        result = Table(header, title=f"{self.design.title}: {self.name} design")
+        mesh = self.mesh
+        for torque in sorted({mesh.torques[0], mesh.torque, mesh.torques[-1]}):
+            at = int(np.searchsorted(mesh.torques, torque))
+            error = mesh.transmission_error[at]
+            numbers = error.mean(), np.ptp(error), mesh.amplitude[at, 0]
+            result.add_row(f"{torque:g}", *(f"{each:.3f}" for each in numbers), f"{mesh.stiffness[at].mean():.1f}")
+        return [result]
+
+    def failures(self) -> Iterator[str]:
+        """A line where the contact was not found somewhere."""
+        if not self.mesh.converged:
+            cause = reason(self.mesh.status)
+            help_ = "Raise resolution.newton_steps or resolution.pairs."
+            yield f"NOT CONVERGED: {self.name}, {cause}; the tables are not written. {help_}"
+
+    def summary(self) -> dict[str, Any]:
+        """Scalars of the tables; the tables are files of their own."""
+        mesh = self.mesh
+        speed = self.design.speed
+        return {
+            "torque_Nm": mesh.torque,
+            "design": self.name,
+            **({} if speed is None else {"mesh_frequency_Hz": float(mesh.teeth[0] * speed / 60)}),
+            "base_radius_mm": mesh.base_radius,
+            "inertia_kgm2": mesh.inertia,
+            "equivalent_mass_kg": mesh.equivalent_mass,
+            "torques_Nm": mesh.torques,
+            "files": list(FILES) if mesh.converged else [],
+            **flanks_data(*self.flanks),
+        }
+
+    def write(self, folder: Path) -> None:
+        """The tables, unless a contact did not converge."""
+        if self.mesh.converged:
+            self.mesh.write(folder)
