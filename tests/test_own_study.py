@@ -1,5 +1,6 @@
 """A study of another package: a command of its own with results, report, interruption and resumption."""
 
+import contextlib
 import importlib.metadata
 import json
 import os
@@ -13,6 +14,7 @@ from report_page import check_report
 
 import jaxgear
 from jaxgear import studies
+from jaxgear.cli import main, run
 from jaxgear.io import load_design
 from jaxgear.studies import registry
 
@@ -130,6 +132,22 @@ def test_it_is_a_command_with_results_and_report(file, tmp_path, package):
     page = check_share_report(folder, path)
     assert ["50", "2.632"] in page.rows
     assert "Every tooth carries the same." in (folder / "report.html").read_text("utf-8")
+
+
+def test_the_verdict_is_printed_before_figures_are_drawn(file, tmp_path, package, monkeypatch):
+    shown = []
+    monkeypatch.setattr(run, "save_figures", lambda *_: shown.append(sys.stdout.getvalue()) or [])
+    done = call("share", file(FIXED), "-o", tmp_path / "out")
+    assert done.code == 0 and "largest share: 2.632 N m" in shown[0] and "results in" not in shown[0]
+
+
+def test_who_reads_no_verdict_has_the_files(file, tmp_path, package):
+    """`jaxgear share pair.toml | head -1`"""
+    reader, writer = os.pipe()
+    os.close(reader)
+    with open(writer, "w") as stream, contextlib.redirect_stdout(stream), pytest.raises(SystemExit) as ended:
+        main(["share", str(file(FIXED)), "-o", str(tmp_path / "out"), "--no-figures"])
+    assert ended.value.code == 0 and (tmp_path / "out" / "shares.csv").exists()
 
 
 def check_share_report(folder, path):

@@ -5,6 +5,7 @@ import os
 import threading
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +18,8 @@ from ..io import (
 )
 from ..numerics import compile_quickly
 from ..studies import AbstractStudy, Checkpoints, write_results
-from . import interrupt, terminal
+from ..studies.results import save_figures
+from . import interrupt, streams, terminal
 from .cache import enable_cache
 from .document import CommandResult, document
 from .progress import Stages
@@ -56,27 +58,29 @@ def run_study(
             _import_ahead(*study.needs, *_FIGURES * figures)
             result = study.run(checkpoints=checkpoints, callback=stages.shown)
             stages.begin("writing the results")
-            if figures:
-                _without_windows()
-            data, files = write_results(folder, study, result, figures=figures)
+            data, _ = write_results(folder, study, result, figures=False)
             findings = result.findings()
             found = CommandResult(
                 lines=list(result.verdict()),
                 warnings=list(result.failures()),
                 findings=None if findings is None else list(findings),
                 tables=list(result.tables()),
-                figures=files,
                 pages=result.chapters(),
                 assumptions=(*result.assumptions, *([f"{omitted}."] if omitted else [])),
                 left_out=study.left_out,
                 first=list(result.headlines()),
                 details=list(result.details()),
             )
+            _show(found, stages)
+            files = []
+            if figures:
+                stages.begin("drawing the figures")
+                _without_windows()
+                files = save_figures(folder, result.figures())
             if asked is not None:
-                asked.write(folder, design, data, found)
+                asked.write(folder, design, data, replace(found, figures=files))
             putting_in_place.enter_context(interrupt.held(f"the results are in {target}{os.sep}"))
             putting_in_place.callback(checkpoints.remove)
-    _show(found)
     if study.quick and study.coarse:
         terminal.say(f"quick run, {study.coarse}: a preview, do not use for design")
     terminal.say(f"results in {target}{os.sep}, {stages.elapsed:.1f} s")
@@ -86,13 +90,20 @@ def run_study(
     return not found.warnings
 
 
-def _show(found: CommandResult) -> None:
-    """Prints all but warnings; what is read first says the findings itself."""
-    for block in found.first:
-        terminal.say_rows(block)
-    for table in found.tables:
-        terminal.console().print(table)
-    terminal.say(*found.lines, *(() if found.first else found.findings or ()), *found.details)
+def _show(found: CommandResult, stages: Stages) -> None:
+    """Prints all but warnings, without the bar; what is read first says the findings itself."""
+    stages.stop()
+    try:
+        for block in found.first:
+            terminal.say_rows(block)
+        for table in found.tables:
+            terminal.console().print(table)
+        terminal.say(*found.lines, *(() if found.first else found.findings or ()), *found.details)
+    except (BrokenPipeError, SystemExit) as end:  # which rich makes of it
+        if isinstance(end, SystemExit) and not isinstance(end.__context__, BrokenPipeError):
+            raise
+        streams.forget_output()  # who reads the first lines alone wants the files as well
+    stages.start()
 
 
 def opened(file: Path, *, cache: bool) -> DesignFile:
