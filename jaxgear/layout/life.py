@@ -18,7 +18,7 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
-import scipy.optimize
+import scipy  # its packages load when they are used
 from jaxtyping import Array, Float, Int8
 
 from ..conditions import LoadSpectrum

@@ -5,6 +5,7 @@ the last of the three. A `ProgramStore` keeps what comes out at the end, by what
 it.
 """
 
+import enum
 import functools
 import io
 import os
@@ -275,20 +276,47 @@ def begin(function: Callable[..., Any], *args: PyTree, **options: PyTree) -> PyT
     return _filled(result, [shape.struct for shape in jax.tree.leaves(result, is_leaf=_is_shape) if _is_shape(shape)])
 
 
+class _Kind(enum.Enum):
+    """What a class of arguments is to a store."""
+
+    TRACED = enum.auto()
+    OF_JAX = enum.auto()
+    WITH_SHAPE = enum.auto()
+    OTHER = enum.auto()
+
+
+@functools.cache  # every call of a program asks of every argument, and classes of JAX take long to tell
+def _kind_of(cls: type) -> _Kind:
+    if issubclass(cls, jax.core.Tracer):
+        return _Kind.TRACED
+    if issubclass(cls, jax.Array):
+        return _Kind.OF_JAX
+    return _Kind.WITH_SHAPE if issubclass(cls, np.ndarray | np.generic | jax.ShapeDtypeStruct) else _Kind.OTHER
+
+
+@functools.cache
+def _name_of(dtype) -> str:
+    return str(dtype)
+
+
+@functools.cache
+def _is_extended(dtype) -> bool:
+    return jnp.issubdtype(dtype, jax.dtypes.extended)
+
+
 def _is_left_to_jax(leaf) -> bool:
     """Whether an argument is being traced, or of a type that no file holds, such as a key of random numbers."""
-    if isinstance(leaf, jax.core.Tracer):
-        return True
-    return isinstance(leaf, jax.Array) and jnp.issubdtype(leaf.dtype, jax.dtypes.extended)
+    kind = _kind_of(leaf.__class__)
+    return kind is _Kind.TRACED or (kind is _Kind.OF_JAX and _is_extended(leaf.dtype))
 
 
 def _shape_of(leaf) -> _Shape | None:
     """What stands for an array; None for everything else."""
-    if isinstance(leaf, jax.Array) and not isinstance(leaf, jax.core.Tracer) and len(leaf.devices()) > 1:
-        return _Shape(leaf.shape, str(leaf.dtype), leaf.weak_type, leaf.sharding)
-    if isinstance(leaf, jax.Array | np.ndarray | np.generic | jax.ShapeDtypeStruct):
-        return _Shape(leaf.shape, str(leaf.dtype), getattr(leaf, "weak_type", False))
-    return None
+    kind = _kind_of(leaf.__class__)
+    if kind is _Kind.OTHER:
+        return None
+    shared = leaf.sharding if kind is _Kind.OF_JAX and leaf.sharding.num_devices > 1 else None
+    return _Shape(leaf.shape, _name_of(leaf.dtype), getattr(leaf, "weak_type", False), shared)
 
 
 def _is_shape(leaf) -> bool:

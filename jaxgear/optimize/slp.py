@@ -95,6 +95,7 @@ class Search:
         self._point = point
         self._model: LinearModel | None = None
         self._radius, self._predicted = _FIRST_RADIUS, 0.0
+        self._ended: float | None = None  # at this tolerance, where it stands: its program need not be solved again
 
     @property
     def penalty(self) -> float | None:
@@ -103,12 +104,14 @@ class Search:
 
     def propose(self, rtol: float) -> bool:
         """Finds the next trial point; False when the search has ended."""
-        if self._model is None or self._radius < _LEAST_RADIUS:
+        if self._model is None or self._radius < _LEAST_RADIUS or self._ended == rtol:
             return False
         step, self._predicted = self._model.best_step(self._radius)
         self.trial = self._point + step
         # a violation that nobody notices is worth no step either
-        return self._predicted > rtol * max(abs(self._model.value), FEASIBLE * self._model.penalty)
+        moves = self._predicted > rtol * max(abs(self._model.value), FEASIBLE * self._model.penalty)
+        self._ended = None if moves else rtol
+        return moves
 
     def take(self, model: LinearModel) -> None:
         """Goes to the trial point if it is as good as its model says, and adapts the radius."""

@@ -38,8 +38,7 @@ from typing import Literal
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
-import scipy.sparse
-import scipy.sparse.linalg
+import scipy  # its packages load when they are used
 from jaxtyping import Array, Bool, Float
 from threadpoolctl import threadpool_limits
 
@@ -320,7 +319,7 @@ def spread_forces(
 
 
 def condense(
-    stiffness: scipy.sparse.sparray | scipy.sparse.spmatrix | np.ndarray, seats: Mapping[str, np.ndarray]
+    stiffness: "scipy.sparse.sparray | scipy.sparse.spmatrix | np.ndarray", seats: Mapping[str, np.ndarray]
 ) -> Housing:
     """The housing of a finite-element model in mm, N and rad, as its compliance between the seats.
 
