@@ -11,7 +11,8 @@ import time
 import pytest
 from commands import FIXED, call
 
-from jaxgear.cli import interrupt, launcher
+from jaxgear.cli import interrupt, launcher, terminal
+from jaxgear.io import folder
 from jaxgear.io.folder import result_folder
 from jaxgear.studies import AbstractStudyResult
 from jaxgear.studies.comparison_run import ComparisonRun
@@ -97,19 +98,20 @@ def test_what_a_library_makes_of_it_does_not_matter(gear, tmp_path, monkeypatch,
     assert not (tmp_path / "out").exists()
 
 
-@pytest.mark.parametrize("late", ["replace", "show"])
+@pytest.mark.parametrize("late", ["replace", "say"])
 def test_results_that_are_there_are_not_denied(gear, tmp_path, monkeypatch, late):
     def press(*arguments):
-        signal.raise_signal(signal.SIGINT)
+        if late == "replace" or any("results in" in line for line in arguments):  # not while the verdict is printed
+            signal.raise_signal(signal.SIGINT)
         return original(*arguments)
 
     monkeypatch.setattr(ComparisonRun, "prepare", lambda self, **_: None)
     monkeypatch.setattr(ComparisonRun, "evaluate", lambda *_: None)
     monkeypatch.setattr(ComparisonRun, "result", lambda *_: Nothing())
-    where = "jaxgear.io.folder._replace" if late == "replace" else "jaxgear.cli.run._show"
-    original = __import__("jaxgear.io.folder", fromlist=["_replace"])._replace
-    monkeypatch.setattr(where, press)
-    result = call("analyze", gear, "-o", tmp_path / "out")
+    module, name = (folder, "_replace") if late == "replace" else (terminal, "say")
+    original = getattr(module, name)
+    monkeypatch.setattr(module, name, press)
+    result = call("analyze", gear, "-o", tmp_path / "out", "--no-figures")
     told = f"jaxgear: writing the results\njaxgear: interrupted, the results are in {tmp_path / 'out'}{os.sep}\n"
     assert (result.code, result.err) == (130, told)
     assert (tmp_path / "out" / "summary.json").exists()
