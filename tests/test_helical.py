@@ -136,6 +136,7 @@ def test_the_plane_of_action_has_inclined_lines_that_carry_the_force():
     assert any(np.isfinite(line).all() for line in lines)  # all over the face
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("width, beta", [(20.0, 15.0), (36.0, 15.0)])
 def test_harmonics_of_a_constant_stiffness(width, beta):
     """2 |sinc(n eps_alpha) sinc(n eps_beta)| of the mean; slices that are whole or apart leave about 1 / slices."""

@@ -22,8 +22,11 @@ SLOPE = {"pinion": jg.LeadSlope(16.0)}
 MAP = {"torque": TORQUE, "positions": 8, "reach": 3.5}
 
 
-def mesh_of(beta=15.0):
+def prepared(beta=15.0) -> jg.Mesh:
     return jg.prepare(pair_of(beta, tooth_thickness_allowance=-40.0), resolution=SIZES)
+
+
+mesh_of = cache(prepared)
 
 
 @cache
@@ -69,7 +72,7 @@ def test_a_small_angle_has_the_map_of_spur_gears():
 
 def test_coast_flanks_touch_where_both_gears_turned_back_put_them():
     """From the flanks' own angles, in every slice of the face: both sides are those of one tooth."""
-    mesh, _ = mapped()
+    mesh = mesh_of()
     pair, contact = mesh.pair, mesh.path_of_contact
     coast = coast_flanks(mesh, jnp.asarray(TORQUE), (None, None))
     angle, play = pair.working_pressure_angle, 1e-3 * pair.backlash
@@ -86,9 +89,10 @@ def test_coast_flanks_touch_where_both_gears_turned_back_put_them():
         np.testing.assert_allclose(pitches, np.round(pitches), atol=1e-9)
 
 
+@pytest.mark.slow
 def test_about_its_middle_a_grid_has_both_flanks_at_the_same_places():
     """In the mirror the face is turned round, and a slope on the coast flanks with it."""
-    mesh, _ = mapped()
+    mesh = mesh_of()
     first, shift, play = _coast_phase(mesh)
     middle = 0.5 * (first + shift / 8)
     steps = jnp.floor(8 * middle)
@@ -103,7 +107,7 @@ def test_about_its_middle_a_grid_has_both_flanks_at_the_same_places():
 
 def test_deviations_keep_their_place_on_the_flank():
     """What is linear along the path of every slice is found again between the positions."""
-    mesh, _ = mapped()
+    mesh = mesh_of()
     finer = half_way(mesh)
     rates = jnp.arange(1.0, 6.0)[None, :, None]
     given = rates * mesh.kinematics.contact_path + rates**2
@@ -149,7 +153,7 @@ def test_contact_lines_that_overlap_excite_less():
 @pytest.mark.slow
 def test_derivatives_by_the_helix_angle_are_central_differences():
     def at(beta):
-        force = dynamics.mesh_force(mesh_of(beta), **MAP, **SLOPE, model="varying stiffness")
+        force = dynamics.mesh_force(prepared(beta), **MAP, **SLOPE, model="varying stiffness")
         both = jnp.asarray([20.0, -110.0])  # on drive and coast flanks
         return jax.vmap(lambda dte: force(jnp.asarray(0.3), dte))(both)
 
@@ -174,7 +178,7 @@ def test_bearings_carry_the_axial_force():
     for beta in (15.0, -15.0):
         oscillator = held(beta=beta)
         found = at_rest(oscillator, jnp.asarray(0.2))
-        load = float(static_force(mapped()[0]))
+        load = float(static_force(mesh_of()))
         along = load * np.tan(float(pair_of(beta).pinion.base_helix_angle))
         x = np.asarray(found.coordinates)
         np.testing.assert_allclose(x[1:4], [-load / 500.0, 0.0, along / 80.0], atol=1e-9)

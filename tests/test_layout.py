@@ -75,9 +75,14 @@ def face():
     return at_stations(SUPPORT, OWN_TORQUE, stations=STATIONS)
 
 
+def rigid_face(misalignment=0.0):
+    """Rigid axes under the torque: one program for them and for bent shafts."""
+    return at_stations(rigid(misalignment), TORQUE, stations=STATIONS)
+
+
 def flat(misalignment=0.0):
-    """Rigid axes as a table: one program under every torque for them and for bent shafts."""
-    return at_stations(rigid(misalignment), TORQUE, stations=STATIONS).table
+    """The same as a table, under every torque."""
+    return rigid_face(misalignment).table
 
 
 @pytest.fixture(scope="module")
@@ -92,7 +97,7 @@ def load_on(face, line=None):
 
 
 def test_flank_line_of_skewed_rigid_axes_is_their_opposite():
-    line = level_load(rigid(20.0), TORQUE, stations=STATIONS)
+    line = level_load(rigid_face(20.0))
     np.testing.assert_allclose([line.slope, line.crowning], [-20.0, 0.0], atol=1e-9)
 
 
@@ -220,7 +225,7 @@ def test_limits_of_a_wider_gear_count_over_its_own_face(own):
 def test_cases_of_a_level_rigid_pair_are_straight_lines(given):
     """K = 1 + c f / 2 w at the end, less half a station; opposite deviations are mirror images."""
     stiffness = given or float(mesh_stiffness(PAIR, 1e3 * TORQUE / float(PINION.pitch_radius) / WIDTH))
-    found = tolerance_cases(rigid(), FlankLineTolerance(4.0, 2.0), torque=TORQUE, stiffness=given, stations=STATIONS)
+    found = tolerance_cases(rigid_face(), FlankLineTolerance(4.0, 2.0), stiffness=given)
     mean = 1e3 * TORQUE / float(PINION.base_radius) / WIDTH
     ends = 0.5 * np.array([0.0, 6.0, 2.0, 2.0, 6.0]) * (1 - 1 / STATIONS)
     np.testing.assert_allclose(found.face_load_factor, 1 + stiffness * ends / mean, rtol=1e-12)
@@ -233,19 +238,19 @@ def test_least_crowning_brings_the_peak_just_inside():
     """Of a rigid pair with gap C (2y/b)^2 + f y/b the load is highest at y = -f b / 8 C: the end needs C = f / 4."""
     slope = 10.0
     tolerance = FlankLineTolerance(slope)
-    given = {"torque": TORQUE, "stations": STATIONS}
-    found = crowning_off_the_edges(rigid(), tolerance, **given)
+    face = rigid_face()
+    found = crowning_off_the_edges(face, tolerance)
     # both stations at the end carry alike: the peak is between them
     peak = 0.5 - 1.0 / STATIONS
     np.testing.assert_allclose(found, slope / (8 * peak), rtol=1e-4)
     for factor, touches in ((0.9, True), (1.02, False)):
-        cases = tolerance_cases(rigid(), tolerance, wheel=FlankLine(0.0, factor * found), **given)
+        cases = tolerance_cases(face, tolerance, wheel=FlankLine(0.0, factor * found))
         assert bool(cases.edge_contact.any()) == touches
-    stricter = crowning_off_the_edges(rigid(), tolerance, share=0.8, **given)
-    cases = tolerance_cases(rigid(), tolerance, wheel=FlankLine(0.0, stricter), **given)
+    stricter = crowning_off_the_edges(face, tolerance, share=0.8)
+    cases = tolerance_cases(face, tolerance, wheel=FlankLine(0.0, stricter))
     load = np.asarray(cases.load.line_load[1])
     np.testing.assert_allclose(max(load[0], load[-1]), 0.8 * load.max(), rtol=1e-4)
-    assert float(crowning_off_the_edges(rigid(), FlankLineTolerance(0.0), **given)) == 0.0
+    assert float(crowning_off_the_edges(face, FlankLineTolerance(0.0))) == 0.0
 
 
 @pytest.fixture(scope="module")
@@ -631,7 +636,7 @@ def test_hours_are_weights_with_a_duration():
             "crowning_off_the_edges: share = 0 must be greater than 0 and at most 1",
         ),
         (
-            lambda: damage(SUPPORT, jg.LoadSpectrum([1.0], duration=3.0), STRENGTH),
+            lambda: damage(flat(), jg.LoadSpectrum([1.0, 2.0, 3.0], duration=3.0), STRENGTH, stations=STATIONS),
             "damage: a load spectrum with a duration needs speeds",
         ),
         (
@@ -647,7 +652,7 @@ def test_hours_are_weights_with_a_duration():
             "LoadSpectrum: sum of the hours = 0 h must be greater than 0 h",
         ),
         (lambda: jg.LoadSpectrum.from_hours([1.0], [-1.0]), "LoadSpectrum: hours = -1 h must be at least 0 h"),
-        (lambda: damage(SUPPORT, DUTY, Strength(1500.0)), "damage: needs Strength.pitting_exponent"),
+        (lambda: damage(flat(), DUTY, Strength(1500.0), stations=STATIONS), "damage: needs Strength.pitting_exponent"),
     ],
 )
 def test_refusals(make, fault):
