@@ -11,6 +11,9 @@ from .free_form import project as project
 from .goal import Constraint as Constraint
 from .gradient_search import LBFGS as LBFGS
 from .gradient_search import Adam as Adam
+from .identify import Identified as Identified
+from .identify import Measurement as Measurement
+from .identify import identify as identify
 from .iteration import iterate_from_low_pressure as iterate_from_low_pressure
 from .iteration import iterate_transmission_error as iterate_transmission_error
 from .minimize import METHODS as METHODS

@@ -1,0 +1,198 @@
+"""Flanks from a measured transmission error: true values, what one torque cannot tell, and data that are refused."""
+
+from functools import cache
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from catalogue import SLIDING, gear_pair
+
+import jaxgear as jg
+from jaxgear.conditions import solve_case
+from jaxgear.io import DesignFileError, read_measurement
+from jaxgear.optimize import Measurement, identify
+from jaxgear.tolerance import ToleranceClass
+
+TORQUES = (30.0, 60.0, 120.0)
+PRIOR = {"pinion": (8.0, 3.0), "wheel": (8.0, 3.0)}
+TRUE = {"pinion": 9.0, "wheel": 6.5}
+NOISE, OFFSET = 0.1, 3.0  # [um]
+
+GOOD = {"phase": np.tile(np.arange(8) / 8, 2), "torque_Nm": np.repeat(TORQUES[:2], 8), "te_um": np.arange(16.0)}
+
+
+@cache
+def mesh() -> jg.Mesh:
+    return jg.prepare(gear_pair(), resolution=SLIDING)
+
+
+def design(unknown):
+    return jg.TipRelief(unknown["pinion"], 4.0), jg.TipRelief(unknown["wheel"], 4.0)
+
+
+@cache
+def readings(torques, scale=1.005):
+    """A pair read at two torques with a scale in error, an offset and noise."""
+    flanks = design(dict(zip(TRUE, map(jnp.asarray, TRUE.values()))))
+    found = [solve_case(mesh(), jnp.asarray(scale * torque), *flanks).transmission_error for torque in torques]
+    value = np.concatenate(found) + OFFSET + NOISE * np.random.default_rng(1).standard_normal(16 * len(torques))
+    return np.tile(np.asarray(mesh().phase), len(torques)), np.repeat(torques, 16), value
+
+
+def found(torques, **options):
+    data = Measurement(*readings(torques), noise=NOISE)
+    return identify(design, PRIOR, data, mesh=mesh(), offset=10.0, **options)
+
+
+@pytest.mark.slow
+def test_three_torques_tell_flanks_scale_and_offset():
+    result = found(TORQUES, model_error=0.0)  # the model itself made the data
+    true = np.array([*TRUE.values(), 1.005, OFFSET])
+    assert result.converged and result.names == ("pinion", "wheel", "torque_scale", "offset")
+    assert np.all(np.abs(result.estimate - true) < 2.5 * result.deviation)
+    assert np.all(result.deviation < result.prior[1]) and 0.5 < result.chi_square < 1.5
+    assert not result.not_told()
+    assert np.all(result.residual_orders(4) < 4 * NOISE / np.sqrt(8))
+    np.testing.assert_allclose(np.diag(result.correlation), 1.0)
+
+
+@pytest.mark.slow
+def test_one_torque_cannot_tell_its_scale_and_names_the_torque_that_would():
+    one = found(TORQUES[1:2], candidates=(60.0, 240.0))
+    assert any("torque_scale" in line and "cannot be told" in line for line in one.not_told())
+    scale = one.names.index("torque_scale")
+    assert one.deviation[scale] > 0.7 * one.prior[1, scale]  # the prior is nearly all that is known
+    # the same torque once more says little, another one most
+    assert one.best_candidate == 240.0
+
+
+@pytest.mark.slow
+def test_true_values_lie_within_two_deviations_where_finite_elements_made_the_data():
+    """Four unknowns of reliefs of class 6, torque scale and offset: at least 90 of 100 draws, each unknown."""
+    structure = jg.finite_element_compliance(gear_pair())
+    true_mesh = jg.prepare(gear_pair(), compliance=structure, resolution=SLIDING)
+    limits = [ToleranceClass.of(gear, 6).profile_total / 3 for gear in gear_pair().gears]
+    names = "pinion", "pinion_length", "wheel", "wheel_length"
+    prior = dict(zip(names, ((10.0, float(limits[0])), (4.0, 0.4), (10.0, float(limits[1])), (4.0, 0.4))))
+
+    def reliefs(unknown):
+        return tuple(jg.TipRelief(unknown[side], unknown[f"{side}_length"]) for side in ("pinion", "wheel"))
+
+    def measured(values):
+        flanks, torques = reliefs(dict(zip(names, values))), jnp.asarray(TORQUES) * values[4]
+        return jax.vmap(lambda torque: solve_case(true_mesh, torque, *flanks).transmission_error)(torques) + values[5]
+
+    mean, spread = np.array([*prior.values(), (1.0, 0.01), (0.0, 5.0)]).T
+    rng = np.random.default_rng(0)
+    true = mean + spread * np.clip(rng.standard_normal((100, 6)), -2.4, 2.4)  # reliefs, no bumps
+    read = np.asarray(jax.jit(lambda all: jax.lax.map(measured, all))(jnp.asarray(true))).reshape(100, -1)
+    read = jnp.asarray(read + NOISE * rng.standard_normal(read.shape))
+    phase, torque = np.tile(np.asarray(mesh().phase), 3), np.repeat(TORQUES, 16)
+
+    @jax.jit
+    def estimates(readings):
+        def one(reading):
+            data = Measurement(phase, torque, reading, noise=NOISE)
+            found = identify(reliefs, prior, data, mesh=mesh(), offset=5.0)
+            return found.estimate, found.deviation, found.converged
+
+        return jax.lax.map(one, readings, batch_size=5)
+
+    estimate, deviation, converged = estimates(read)
+    inside = np.sum(np.abs(np.asarray(estimate) - true) <= 2 * np.asarray(deviation), axis=0)
+    assert np.sum(converged) >= 98 and np.all(inside >= 90), inside
+
+
+@pytest.mark.slow
+def test_an_error_of_the_model_widens_the_deviations():
+    phase, torque, value = readings(TORQUES)
+    error = 0.5 * torque / max(TORQUES) * np.cos(2 * np.pi * phase)
+    options = {"mesh": mesh(), "offset": 10.0, "model_error": 0.0}
+    right = identify(design, PRIOR, Measurement(phase, torque, value, noise=NOISE), **options)
+    wrong = identify(design, PRIOR, Measurement(phase, torque, value + error, noise=NOISE), **options)
+    assert wrong.model_error > 2 * right.model_error
+    assert np.all(wrong.deviation[:2] > 1.2 * right.deviation[:2])
+
+
+@pytest.mark.slow
+def test_repeats_tell_the_noise():
+    phase, torque, value = (np.tile(column, 30) for column in readings(TORQUES[:1]))
+    value = value + NOISE * np.random.default_rng(2).standard_normal(len(value))
+    result = identify(design, PRIOR, Measurement(phase, torque, value), mesh=mesh(), offset=10.0, steps=1)
+    np.testing.assert_allclose(result.noise, NOISE / np.sqrt(30), rtol=0.1)
+
+
+@pytest.mark.parametrize(
+    "change, says",
+    [
+        ({"phase": lambda column: column[:10]}, "phase has 10 rows, must have 12 at least"),
+        ({"torque": lambda column: column[:20]}, "torque has 20 rows, phase 48"),
+        ({"phase": lambda column: 0.5 * column}, "phase does not cover a base pitch at 30 N m"),
+        ({"transmission_error": lambda column: np.where(column > 20, np.nan, column)}, "transmission_error"),
+        ({"torque": lambda column: -column}, "torque"),
+    ],
+)
+def test_data_that_cannot_be_meant_are_refused_by_column(change, says):
+    columns = {"phase": np.tile(np.arange(16) / 16, 3), "torque": np.repeat(TORQUES, 16)}
+    columns["transmission_error"] = np.arange(48.0)
+    columns |= {name: of(columns[name]) for name, of in change.items()}
+    with pytest.raises(ValueError, match=says) as refused:
+        Measurement(**columns, noise=NOISE)
+    assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    "options, says",
+    [
+        ({"prior": {}}, "prior must name at least one unknown"),
+        ({"prior": {**PRIOR, "pinion": (8.0, 0.0)}}, "prior standard deviation of pinion"),
+        ({"prior": {**PRIOR, "crowning": (0.0, 3.0)}}, "nothing depends on crowning"),
+        ({"prior": {**PRIOR, "offset": (0.0, 3.0)}}, "give offset = its standard deviation"),
+        ({"noise": None}, "noise = None needs 12 repeated readings"),
+        ({"steps": 0}, "steps = 0"),
+    ],
+)
+def test_impossible_questions_are_refused(options, says):
+    given = {"prior": PRIOR, "noise": NOISE, "steps": 3, **options}
+    data = Measurement(*GOOD.values(), noise=given["noise"])
+    with pytest.raises(ValueError, match=says):
+        identify(design, given["prior"], data, mesh=mesh(), steps=given["steps"])
+
+
+def rows(columns):
+    table = zip(*(np.char.mod("%.6g", column) for column in columns.values()))
+    return "\n".join([",".join(columns), *map(",".join, table)])
+
+
+@pytest.mark.parametrize("unit", ["phase", "angle_deg"])
+def test_a_file_is_read_by_phase_or_angle(tmp_path, unit):
+    columns = {(unit if name == "phase" else name): column for name, column in GOOD.items()}
+    if unit == "angle_deg":
+        columns[unit] = columns[unit] * 360 / 19
+    (tmp_path / "te.csv").write_text(rows(columns | {"revolution": np.ones(16)}))
+    read = read_measurement(tmp_path / "te.csv", mesh().pair, noise=0.2)
+    np.testing.assert_allclose(read.phase, GOOD["phase"], atol=1e-5)
+    np.testing.assert_allclose([read.torque, read.transmission_error], [GOOD["torque_Nm"], GOOD["te_um"]])
+
+
+@pytest.mark.parametrize(
+    "columns, says",
+    [
+        ({name: GOOD[name] for name in ("phase", "te_um")}, "torque_Nm: missing, this column is required"),
+        ({name: GOOD[name] for name in ("torque_Nm", "te_um")}, "phase: there must be one of the columns"),
+        (GOOD | {"te_mm": GOOD["te_um"]}, "te_mm: unknown column"),
+        (GOOD | {"torque_Nm": 1e3 * GOOD["torque_Nm"]}, "torque_Nm: 60000 N m is more than the teeth carry"),
+        (GOOD | {"te_um": 1e-6 * GOOD["te_um"]}, "te_um: varies by 1.5e-05 um only"),
+        (GOOD | {"te_um": 1e3 * GOOD["te_um"]}, "te_um: varies by 15000 um"),
+        (GOOD | {"te_um": np.where(GOOD["te_um"] > 9, np.nan, 1.0)}, 'te_um of point 11 is "nan", must be a number'),
+        (GOOD | {"phase": 0.5 * GOOD["phase"]}, "phase: does not cover a base pitch at 30 N m"),
+        ({name: column[:10] for name, column in GOOD.items()}, "phase: has 10 rows, must have 12 at least"),
+        (GOOD | {"torque_Nm": -GOOD["torque_Nm"]}, "torque_Nm: "),
+    ],
+)
+def test_bad_files_are_refused_in_one_line_with_the_column(tmp_path, columns, says):
+    (tmp_path / "te.csv").write_text(rows(columns))
+    with pytest.raises(DesignFileError) as refused:
+        read_measurement(tmp_path / "te.csv", mesh().pair)
+    assert f"te.csv: {says}" in str(refused.value) and "\n" not in str(refused.value)
