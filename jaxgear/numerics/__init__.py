@@ -17,6 +17,7 @@ from .coupled_points import Pressed as Pressed
 from .coupled_points import press as press
 from .coupling import Other as Other
 from .coupling import SliceCoupling as SliceCoupling
+from .dense import pivots as pivots
 from .dense import positive_definite as positive_definite
 from .dense import pseudo_inverse as pseudo_inverse
 from .dense import solve_dense as solve_dense

@@ -7,8 +7,8 @@ Their error is that of Gaussian elimination (Peters and Wilkinson, On the stabil
 pivoting, Commun. ACM 18 (1975) 20-24, doi 10.1145/360569.360653). Where a matrix may be singular, rotations make its
 columns orthogonal (Hestenes, J. Soc. Indust. Appl. Math. 6 (1958) 51-90, doi 10.1137/0106005).
 
-LAPACK is left with the eigenvalues and singular values of motions in `dynamics`: of one matrix of a program, or of
-points of a branch, which are found one after the other.
+LAPACK is left with the eigenvalues and singular values of motions in `dynamics` and of a measurement in `optimize`: of
+one matrix of a program, or of several that are found one after the other.
 """
 
 from functools import partial
@@ -95,21 +95,28 @@ def _exchanged(slab: Slab, chosen: Int[Array, " n"], at) -> tuple[Slab, Int[Arra
     return jax.lax.fori_loop(0, slab.shape[1], exchange, (slab, chosen))
 
 
+def pivots(matrix: Matrix) -> Float[Array, " n"]:
+    """Of the elimination of a symmetric matrix without exchanges; their product is its determinant where all are
+    positive. Not differentiable.
+    """
+    rows = jnp.arange(len(matrix))
+
+    def eliminate(k, state):
+        left, found = state
+        pivot = left[k, k]
+        share = jnp.where(rows > k, left[:, k], 0.0) / jnp.where(pivot > 0, pivot, 1.0)
+        return left - share[:, None] * left[k][None], found.at[k].set(pivot)
+
+    start = jax.lax.stop_gradient(matrix), jnp.zeros(len(matrix), matrix.dtype)
+    return jax.lax.fori_loop(0, len(matrix), eliminate, start)[1]
+
+
 def positive_definite(matrix: Matrix) -> Bool[Array, ""]:
     """Whether all eigenvalues of a symmetric matrix are positive: as many as pivots are (Sylvester's law of inertia).
 
     They are above x where matrix - x I is positive definite. False where a number is NaN.
     """
-    rows = jnp.arange(len(matrix))
-
-    def eliminate(k, state):
-        left, positive = state
-        pivot = left[k, k]
-        share = jnp.where(rows > k, left[:, k], 0.0) / jnp.where(pivot > 0, pivot, 1.0)
-        return left - share[:, None] * left[k][None], positive & (pivot > 0)
-
-    start = jax.lax.stop_gradient(matrix), jnp.ones((), bool)
-    return jax.lax.fori_loop(0, len(matrix), eliminate, start)[1]
+    return jnp.all(pivots(matrix) > 0)
 
 
 @partial(jax.custom_jvp, nondiff_argnums=(1,))

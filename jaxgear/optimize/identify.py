@@ -1,6 +1,7 @@
 """What flanks gave a measured transmission error: named unknowns with the uncertainty that the data leave."""
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import NamedTuple
 
 import equinox as eqx
@@ -12,7 +13,7 @@ from jaxtyping import Array, Bool, Float
 from ..conditions import Design, Variants, conditions, solve_case, two_modifications
 from ..contact import Mesh
 from ..contact.solve import check_mesh
-from ..numerics import Checked, check, concrete, number, program, result, whole
+from ..numerics import Checked, check, concrete, number, pivots, program, result, solve_dense, whole
 
 Scalar = Float[Array, ""]
 Rows = Float[Array, " rows"]
@@ -32,7 +33,6 @@ _DAMPING = 100.0  # of the first step, which prior deviations measure
 _SETTLED = 0.05  # largest move at the end, in prior standard deviations
 _ROUND_OFF = 1e-9
 _NOTHING = 1e6  # noises between the data and what is not known
-_RIDGE = 1e-9  # of the noise, so that a factorization in round-off stays definite
 
 
 class Measurement(Checked):
@@ -225,34 +225,48 @@ def _error_shapes(data: _Data) -> Float[Array, "rows shapes"]:
     return jnp.concatenate([alike, (own[:, :, None] * alike[:, None, :]).reshape(alike.shape[0], -1)], axis=1)
 
 
-def _whitening(data: _Data, shapes: Array, size: Scalar) -> Array:
-    """Lower Cholesky factor of the covariance of noise and error of the model."""
-    return jnp.linalg.cholesky(jnp.diag((1 + _RIDGE) * data.noise**2) + size**2 * (shapes @ shapes.T))
+class _Errors(NamedTuple):
+    """Noise and error of the model, turned so that both are independent: sums of readings in noises.
+
+    Attributes:
+        turn: the sums, a row each.
+        variance: of the error of the model in every one, where its shapes have unit size.
+    """
+
+    turn: Float[Array, "rows rows"]
+    variance: Rows
+
+    def whitened(self, size: Scalar, of: Array) -> Array:
+        """Columns of readings, in standard deviations."""
+        deviation = jnp.sqrt(1 + size**2 * self.variance)
+        return (self.turn @ of) / deviation.reshape(-1, *[1] * (of.ndim - 1))
 
 
-def _evidence(data: _Data, shapes: Array, size: Scalar, slopes: Array, left: Rows) -> Scalar:
+def _errors(data: _Data) -> _Errors:
+    shapes = _error_shapes(data) / data.noise[:, None]
+    variance, turn = jnp.linalg.eigh(shapes @ shapes.T)
+    return _Errors(turn.T / data.noise[None], jnp.maximum(variance, 0.0))
+
+
+def _evidence(errors: _Errors, size: Scalar, slopes: Array, left: Rows) -> Scalar:
     """Logarithm of the probability of the data under an error of the model of this size, the unknowns integrated."""
-    lower = _whitening(data, shapes, size)
-    white = jax.scipy.linalg.solve_triangular(lower, jnp.concatenate([slopes, left[:, None]], 1), lower=True)
-    a, r = white[:, :-1], white[:, -1]
-    normal = jnp.eye(a.shape[1], dtype=a.dtype) + a.T @ a
-    b = a.T @ r
-    determinant = 2 * jnp.sum(jnp.log(jnp.diagonal(lower))) + jnp.linalg.slogdet(normal)[1]
-    return -0.5 * (r @ r - b @ jnp.linalg.solve(normal, b) + determinant)
+    a, r = errors.whitened(size, slopes), errors.whitened(size, left)
+    normal, b = jnp.eye(a.shape[1], dtype=a.dtype) + a.T @ a, a.T @ r
+    determinant = jnp.sum(jnp.log1p(size**2 * errors.variance)) + jnp.sum(jnp.log(pivots(normal)))
+    return -0.5 * (r @ r - b @ solve_dense(normal, b) + determinant)
 
 
 @program
 def _fit(problem: _Problem, data: _Data, steps: int) -> _Fit:
     """Gauss-Newton with Levenberg's damping; the size of the error of the model is a mean by probability."""
-    shapes = _error_shapes(data)
+    errors = _errors(data)
     sizes = jnp.asarray(_SIZES, data.value.dtype) * jnp.mean(data.noise)
 
     def white(z, slopes, values):
         left = data.value - values + slopes @ z
-        weight = jax.nn.softmax(jax.vmap(lambda size: _evidence(data, shapes, size, slopes, left))(sizes))
+        weight = jax.nn.softmax(jax.vmap(lambda size: _evidence(errors, size, slopes, left))(sizes))
         size = jnp.sqrt(weight @ sizes**2 + problem.least_error**2)
-        lower = _whitening(data, shapes, size)
-        return size, lambda of: jax.scipy.linalg.solve_triangular(lower, of, lower=True)
+        return size, partial(errors.whitened, size)
 
     def step(state, _):
         z, slopes, values, damping, move = state
@@ -266,7 +280,7 @@ def _fit(problem: _Problem, data: _Data, steps: int) -> _Fit:
         _, whiten = white(z, slopes, values)
         a, r = whiten(slopes), whiten(data.value - values)
         normal = a.T @ a + (1 + damping) * jnp.eye(z.shape[0], dtype=z.dtype)
-        return (z, slopes, values, damping, jnp.linalg.solve(normal, a.T @ r - z)), better
+        return (z, slopes, values, damping, solve_dense(normal, a.T @ r - z)), better
 
     # before the first step nothing is known, and whatever it finds is better
     z = jnp.zeros_like(problem.mean)
@@ -276,7 +290,8 @@ def _fit(problem: _Problem, data: _Data, steps: int) -> _Fit:
     fine = jnp.any(accepted) & (jnp.max(jnp.abs(move)) < _SETTLED)
     size, whiten = white(z, slopes, values)
     a = whiten(slopes)
-    covariance = jnp.linalg.inv(a.T @ a + jnp.eye(z.shape[0], dtype=z.dtype))
+    unit = jnp.eye(z.shape[0], dtype=z.dtype)
+    covariance = solve_dense(a.T @ a + unit, unit)
     _, singular, directions = jnp.linalg.svd(a, full_matrices=False)
     return _Fit(z, covariance, singular, directions, values, size, fine)
 
@@ -295,8 +310,7 @@ def _further(problem: _Problem, z: Vector, data: _Data, size: Scalar, candidate:
     )
     slopes, _, _ = problem.jacobian(z, more)
     grown = size * jnp.max(torques) / jnp.max(data.torques)  # the shapes are those at the largest torque
-    white = jax.scipy.linalg.solve_triangular(_whitening(more, _error_shapes(more), grown), slopes, lower=True)
-    return jnp.linalg.svd(white, compute_uv=False)
+    return jnp.linalg.svd(_errors(more).whitened(grown, slopes), compute_uv=False)
 
 
 def identify(
