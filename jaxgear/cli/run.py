@@ -19,6 +19,7 @@ from ..io import (
 from ..numerics import compile_quickly
 from ..studies import AbstractStudy, Checkpoints, write_results
 from ..studies.results import save_figures
+from ..studies.study import AbstractStudyResult
 from . import interrupt, streams, terminal
 from .cache import enable_cache
 from .document import CommandResult, document
@@ -57,6 +58,7 @@ def run_study(
             stages.replaces(target)
             _import_ahead(*study.needs, *_FIGURES * figures)
             result = study.run(checkpoints=checkpoints, callback=stages.shown)
+            figures = figures and type(result).figures is not AbstractStudyResult.figures
             stages.begin("writing the results")
             data, _ = write_results(folder, study, result, figures=False)
             findings = result.findings()
