@@ -53,7 +53,7 @@ def test_three_torques_tell_flanks_scale_and_offset():
     assert np.all(np.abs(result.estimate - true) < 2.5 * result.deviation)
     assert np.all(result.deviation < result.prior[1]) and 0.5 < result.chi_square < 1.5
     assert not result.not_told()
-    assert np.all(result.residual_orders(4) < 4 * NOISE / np.sqrt(8))
+    assert np.mean(result.residual_orders < result.noise_orders[:, None]) > 0.8  # 95 % but for what the fit takes
     np.testing.assert_allclose(np.diag(result.correlation), 1.0)
 
 

@@ -2,20 +2,26 @@
 
 import csv
 import json
+import signal
 
 import jax.numpy as jnp
-import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from commands import FIXED, VARIABLES, assert_refused, call
 
 from jaxgear.conditions import solve_case
-from jaxgear.io import load_design
+from jaxgear.contact.kinematics import kinematics
+from jaxgear.io import DesignFile, load_design, read_rexs
+from jaxgear.numerics import real
 from jaxgear.optimize import Identified
-from jaxgear.studies import DesignIdentification, IdentificationResult, write_results
+from jaxgear.studies import DesignIdentification, identification
 from jaxgear.tolerance import ToleranceClass
 
 BASE = FIXED.replace("amount = 6.5", 'amount = "height"') + VARIABLES
+BOTH = (
+    BASE.replace("amount = 7.5", 'amount = "depth"') + 'depth = { low = 0.0, high = 16.0, value = 6.0, unit = "um" }\n'
+)
+CLASSES = "[tolerance]\nquality_class = [5, 7]\n"
 TRUE, TORQUES = 8.0, (30.0, 60.0)
 
 
@@ -41,81 +47,136 @@ def measured(folder):
     return path, data
 
 
-def result_of(study, height):
-    """A result with an estimate of the relief, without a search."""
-    data = study.measurement
-    found = Identified(
-        names=("height", "torque_scale"),
-        estimate=jnp.array([height, 1.0]),
-        deviation=jnp.array([0.5, 0.01]),
-        correlation=jnp.array([[1.0, 0.8], [0.8, 1.0]]),
-        prior=jnp.array([[10.0, 1.0], [5.0, 0.01]]),
-        singular_values=jnp.array([10.0, 0.1]),
-        directions=jnp.eye(2),
-        torque=data.torque,
-        phase=data.phase,
-        measured=data.transmission_error,
-        fitted=data.transmission_error,
-        noise=jnp.full_like(data.phase, 0.05),
-        model_error=jnp.asarray(0.1),
-        chi_square=jnp.asarray(1.0),
-        converged=jnp.asarray(True),
-        candidates=jnp.array([50.0]),
-        told_by_candidates=jnp.array([[10.0, 0.2]]),
-    )
-    return IdentificationResult(study.design, study.measured, found)
+class Search:
+    """Takes the place of the search: gives an estimate of the relief and keeps what was asked for."""
+
+    def __init__(self, monkeypatch, height):
+        self.height = height
+        monkeypatch.setattr(identification, "identify", self)
+        monkeypatch.setattr("jaxgear.studies.results.gears", lambda design: {})  # which other tests compile
+        monkeypatch.setattr(DesignFile, "mesh", lambda self, size: kinematics(self.pair(), real(0.0), size, "strain"))
+
+    def __call__(self, design, prior, measurement, **asked):
+        self.asked = asked
+        left = 0.3 * np.cos(4 * np.pi * measurement.phase)  # the second mesh order
+        names, count = (*prior, "torque_scale"), len(prior) + 1
+        return Identified(
+            names=names,
+            estimate=jnp.full(count, self.height),
+            deviation=jnp.full(count, 0.5),
+            correlation=0.8 + 0.2 * jnp.eye(count),
+            prior=jnp.ones((2, count)),
+            singular_values=jnp.geomspace(10.0, 0.1, count),
+            directions=jnp.eye(count),
+            torque=measurement.torque,
+            phase=measurement.phase,
+            measured=measurement.transmission_error,
+            fitted=measurement.transmission_error - left,
+            noise=jnp.full_like(measurement.phase, 0.05),
+            model_error=jnp.asarray(0.1),
+            chi_square=jnp.asarray(1.0),
+            converged=jnp.asarray(True),
+            candidates=jnp.array([50.0]),
+            told_by_candidates=jnp.full((1, count), 0.2),
+        )
 
 
-def test_what_is_found_is_said_and_written(tmp_path):
-    path, data = written(tmp_path)
-    study = DesignIdentification.of(load_design(path), measured=data, noise=0.05)
-    result = result_of(study, 8.0)
-    assert study.prior == {"height": (10.0, 5.0)}
-    assert not list(result.failures()) and not result.findings()
-    summary, _ = write_results(tmp_path / "out", study, result, figures=False)
-    assert summary["unknowns"]["height"]["estimate"] == 8.0 and summary["unknowns"]["height"]["unit"] == "um"
-    said = list(result.verdict())
-    assert "correlation of height and torque_scale: 0.80" in said and "50 N m" in said[-1]
-    assert summary["cannot_tell"] == [line for line in said if "cannot be told" in line] != []
-    assert json.loads((tmp_path / "out" / "summary.json").read_text())["cannot_tell"] == summary["cannot_tell"]
-    with (tmp_path / "out" / "identified.csv").open(encoding="utf-8") as file:
+@pytest.fixture(scope="module")
+def ran(tmp_path_factory):
+    """One run of the command."""
+    folder = tmp_path_factory.mktemp("identify")
+    path, data = written(folder, BOTH.replace("positions = 16", "positions = 32") + CLASSES)
+    with pytest.MonkeyPatch.context() as monkeypatch:
+        search = Search(monkeypatch, 8.0)
+        monkeypatch.setenv("JAXGEAR_NO_CACHE", "1")
+        result = call("identify", path, data, "--noise", 0.05, "--offset", 2, "--quick", "-o", folder / "out")
+    assert result.code == 0, result.err
+    summary = json.loads((folder / "out" / "summary.json").read_text(encoding="utf-8"))
+    return result, folder / "out", summary, search
+
+
+def test_its_files(ran):
+    _, folder, summary, _ = ran
+    names = {
+        "summary.json",
+        "flanks.csv",
+        "k_chart.png",
+        *(f"identified.{end}" for end in ("csv", "toml", "rexs", "png")),
+    }
+    assert {path.name for path in folder.iterdir()} == names
+    with (folder / "identified.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
-    assert [(row["name"], row["unit"]) for row in rows] == [("height", "um"), ("torque_scale", "")]
-    made = load_design(tmp_path / "out" / "identified.toml")
-    assert float(made.design({})[0].amount) == 8.0
-    panels = np.ravel(result.figures()["identified"])
-    assert panels[-1].get_xlabel() == "phase [base pitches]"
-    assert [panel.get_ylabel() for panel in panels] == ["TE at 30 N m [µm]", "TE at 60 N m [µm]"]
-    plt.close("all")
+    assert [(row["name"], row["unit"]) for row in rows] == [("height", "um"), ("depth", "um"), ("torque_scale", "")]
+    assert summary["unknowns"]["height"]["estimate"] == float(rows[0]["estimate"]) == 8.0
 
 
-def test_an_estimate_that_is_no_flank_is_flagged_and_makes_no_design_file(tmp_path):
+def test_the_flanks_it_writes_are_those_of_the_estimates(ran):
+    folder = ran[1]
+    assert [float(flank.amount) for flank in load_design(folder / "identified.toml").design({})] == [8.0, 8.0]
+    assert (folder / "identified.rexs").read_text(encoding="utf-8-sig").startswith("<?xml")
+    with (folder / "flanks.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    largest = {(row["design"], row["gear"]): float(row["modification_um"]) for row in rows}  # the last is at the tip
+    assert largest[("identified", "pinion")] == 8.0 and largest[("prior", "pinion")] == 10.0
+    assert largest[("identified", "wheel")] == 8.0 and largest[("prior", "wheel")] == 6.0
+
+
+def test_what_it_says(ran):
+    result, _, summary, _ = ran
+    assert "correlation of height and torque_scale: 0.80" in result.out
+    assert "least: 50 N m" in result.out and "quick run, coarse positions" in result.out
+    (line,) = summary["cannot_tell"]
+    assert line.startswith("torque_scale cannot be told: ") and line in result.out
+
+
+def test_what_the_fit_leaves_is_given_by_mesh_orders(ran):
+    result, _, summary, _ = ran
+    expected = np.where(np.arange(7) == 1, 0.3, 0.0)  # 16 readings tell 7 orders
+    np.testing.assert_allclose(summary["residual_orders_um"], [expected] * 2, atol=1e-12)
+    # of 16 readings the cosine and the sine each scatter with sqrt(2/16) of the noise, see Rayleigh's law
+    np.testing.assert_allclose(summary["noise_orders_um"], 0.05 * np.sqrt(-2 * np.log(0.05) * 2 / 16))
+    assert "order 2" in result.out and "0.300" in result.out
+
+
+def test_what_it_asks_for(ran):
+    asked = ran[3].asked
+    assert asked["offset"] == 2.0 and asked["torque_scale"] == 0.01 and asked["candidates"] == [50.0]
+    assert asked["mesh"].resolution.positions == 16  # of a quick run
+
+
+def test_priors_are_those_of_the_class_of_each_gear(tmp_path):
+    path, data = written(tmp_path, BOTH + CLASSES)
+    design = load_design(path)
+    prior = DesignIdentification.of(design, measured=data, noise=0.05).prior
+    for (mean, deviation), gear, number, value in zip(prior.values(), design.pair().gears, (5, 7), (10.0, 6.0)):
+        assert mean == value and deviation == pytest.approx(float(ToleranceClass.of(gear, number).profile_total) / 3)
+    (tmp_path / "pair.toml").write_text(BASE, encoding="utf-8")
+    assert DesignIdentification.of(load_design(path), measured=data, noise=0.05).prior == {"height": (10.0, 5.0)}
+
+
+def test_an_estimate_that_is_no_flank_is_flagged_and_makes_no_design_file(tmp_path, monkeypatch):
     base = FIXED.replace("length = 5.0", 'length = "height"', 1) + "[variables]\nheight = { low = 1.0, high = 6.0 }\n"
-    path, data = written(tmp_path, base)
-    study = DesignIdentification.of(load_design(path), measured=data, noise=0.05)
-    result = result_of(study, -1.0)
-    write_results(tmp_path / "out", study, result, figures=False)
-    assert "NO DESIGN FILE" in next(iter(result.failures())) and "outside its range" in result.findings()[0]
+    Search(monkeypatch, -1.0)
+    result = call("identify", *written(tmp_path, base), "--noise", 0.05, "-o", tmp_path / "out", "--no-figures")
+    assert result.code == 1 and "NO DESIGN FILE" in result.err and "outside its range" in result.out
     assert {one.name for one in (tmp_path / "out").iterdir()} == {"summary.json", "identified.csv"}
 
 
-@pytest.mark.slow
-def test_the_search_finds_the_relief(tmp_path):
-    path, data = measured(tmp_path)
-    result = DesignIdentification.of(load_design(path), measured=data, noise=0.05).run()
-    height = result.summary()["unknowns"]["height"]
-    assert not list(result.failures())
-    assert abs(height["estimate"] - TRUE) < 3 * height["standard_deviation"] < 3 * height["prior_standard_deviation"]
+def test_flanks_that_rexs_has_no_place_for_are_said_and_left_out(tmp_path, monkeypatch):
+    Search(monkeypatch, 8.0)
+    path, data = written(tmp_path, BASE + "[pair]\naxial_offset = 1.0\n")
+    result = call("identify", path, data, "--noise", 0.05, "-o", tmp_path / "out", "--no-figures")
+    assert result.code == 0 and "identified.rexs is not written: " in result.out
+    names = {"summary.json", "identified.csv", "identified.toml", "flanks.csv"}
+    assert {one.name for one in (tmp_path / "out").iterdir()} == names
 
 
-def test_priors_are_those_of_the_tolerance_class(tmp_path):
-    path, data = written(
-        tmp_path, BASE.replace("high = 20.0", "high = 20.0, value = 6.0") + "[tolerance]\nquality_class = 6\n"
-    )
-    design = load_design(path)
-    mean, deviation = DesignIdentification.of(design, measured=data, noise=0.05).prior["height"]
-    limit = ToleranceClass.of(design.pair().pinion, 6).profile_total
-    assert mean == 6.0 and deviation == pytest.approx(float(limit) / 3)
+def test_interrupted_it_leaves_nothing(tmp_path, monkeypatch):
+    monkeypatch.setattr(DesignFile, "mesh", lambda *_: None)
+    monkeypatch.setattr(identification, "identify", lambda *_, **__: signal.raise_signal(signal.SIGINT))
+    result = call("identify", *written(tmp_path), "--noise", 0.05, "-o", tmp_path / "out")
+    assert result.code == 130 and result.err.endswith("jaxgear: interrupted, nothing was written\n")
+    assert "Traceback" not in result.err and {one.name for one in tmp_path.iterdir()} == {"pair.toml", "te.csv"}
 
 
 @pytest.mark.parametrize(
@@ -125,6 +186,7 @@ def test_priors_are_those_of_the_tolerance_class(tmp_path):
         (BASE, (",30.0,", ",x,"), ["--noise", 0.1], ["te.csv", "torque_Nm"]),
         (BASE, ("", ""), ["--noise", -1], ["noise = -1 um must be greater than 0 um"]),
         (BASE, ("", ""), ["--noise", 0.1, "--offset", -1], ["offset = -1 um must be at least 0 um"]),
+        (BASE, ("", ""), [], ["te.csv: te_um: noise = None needs 12 repeated readings", "--noise gives it"]),
         (FIXED, ("", ""), ["--noise", 0.1], ["pair.toml", "variables: missing"]),
     ],
 )
@@ -135,20 +197,17 @@ def test_what_is_refused_leaves_nothing(tmp_path, base, change, options, fragmen
     assert {one.name for one in tmp_path.iterdir()} == {"pair.toml", "te.csv"}
 
 
-def test_data_without_repeats_need_their_noise(tmp_path):
-    found = call("identify", *written(tmp_path), "-o", tmp_path / "out")
-    line = found.err.splitlines()[-1]  # after the stages
-    assert found.code == 2 and found.out == "" and "te.csv: te_um: noise = None needs" in line and "--noise" in line
-    assert {one.name for one in tmp_path.iterdir()} == {"pair.toml", "te.csv"}
-
-
 def test_a_file_that_is_not_there(tmp_path):
     assert_refused(call("identify", written(tmp_path)[0], tmp_path / "none.csv"), "none.csv: No such file")
 
 
 @pytest.mark.slow
-def test_the_command_writes_its_results(tmp_path):
-    found = call("identify", *measured(tmp_path), "--noise", 0.05, "--output", tmp_path / "out", "--report")
+def test_the_command_finds_the_relief(tmp_path):
+    path, data = measured(tmp_path)
+    found = call("identify", path, data, "--noise", 0.05, "--output", tmp_path / "out", "--report")
     assert found.code == 0, found.err
-    names = {"identified.csv", "identified.toml", "identified.png", "report.html", "summary.json"}
-    assert {path.name for path in (tmp_path / "out").iterdir()} == names
+    assert (tmp_path / "out" / "report.html").exists()
+    height = json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))["unknowns"]["height"]
+    exchanged = read_rexs(tmp_path / "out" / "identified.rexs")
+    assert float(exchanged.pinion.amount) == pytest.approx(height["estimate"])
+    assert abs(height["estimate"] - TRUE) < 3 * height["standard_deviation"] < 3 * height["prior_standard_deviation"]

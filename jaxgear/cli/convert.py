@@ -72,7 +72,7 @@ def _to_rexs(source: Path, target: Path) -> None:
             torque=design.torque,
             speed=design.speed,
             quality_classes=design.quality_classes,
-            materials=(design.drawn["pinion"].get("material"), design.drawn["wheel"].get("material")),
+            materials=design.materials,
             title=design.title,
         )
     _say(target, design.pair())

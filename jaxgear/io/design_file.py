@@ -233,6 +233,11 @@ class DesignFile:
         given = section.weights
         return load if given is None else refused(f"{section.at}.weights", LoadSpectrum, torques, given, **run_at)
 
+    @property
+    def materials(self) -> tuple[str | None, str | None]:
+        """Names of the materials of pinion and wheel; None where the file names none."""
+        return self.drawn["pinion"].get("material"), self.drawn["wheel"].get("material")
+
     def pair(self, parameters: Mapping[str, Any] | None = None) -> GearPair:
         """The gear pair.
 

@@ -56,6 +56,7 @@ RESULT_FILES = frozenset(
         "orders.png",
         "identified.csv",
         "identified.toml",
+        "identified.rexs",
         "identified.png",
         "mesh.npz",
         "transmission_error.csv",

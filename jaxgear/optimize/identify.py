@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Array, Bool, Float
 
 from ..conditions import Design, Variants, conditions, solve_case, two_modifications
-from ..contact import Mesh
+from ..contact import Mesh, Resolution
 from ..contact.solve import check_mesh
 from ..numerics import Checked, check, concrete, number, pivots, program, result, solve_dense, whole
 
@@ -32,6 +32,7 @@ _NAMED = 0.3  # least share in a combination that is named
 _DAMPING = 100.0  # of the first step, which prior deviations measure
 _SETTLED = 0.05  # largest move at the end, in prior standard deviations
 _ROUND_OFF = 1e-9
+_OF_NOISE = 2 * (-np.log(0.05)) ** 0.5  # 95 % of amplitudes by Rayleigh's law, over noise and root of the readings
 _NOTHING = 1e6  # noises between the data and what is not known
 
 
@@ -70,6 +71,14 @@ class Measurement(Checked):
                     f"Measurement: phase does not cover a base pitch at {level:g} N m: {gap:.2g} of it are without a "
                     f"reading, must be {_LARGEST_GAP:g} at most"
                 )
+
+    def noise_on(self, resolution: Resolution) -> Scalar:
+        """Standard deviation of a reading [um], given or of readings of one torque within one position of the mesh.
+
+        Raises:
+            ValueError: for none that is given and too few repeats, or repeats that are all alike.
+        """
+        return _noise(self, _bins(self, resolution.positions, float(np.asarray(resolution.first_phase))))
 
 
 class _Data(eqx.Module):
@@ -147,15 +156,37 @@ class Identified(Checked):
                 lines.append(f"{words.removeprefix('+ ')} {what}: {left:.0%} of the prior deviation is left")
         return lines
 
-    def residual_orders(self, orders: int = _ORDERS) -> Float[np.ndarray, "torques orders"]:
-        """Amplitudes of the mesh orders of what the fit leaves, a row per torque [um]."""
-        torque, phase = np.asarray(self.torque), np.asarray(self.phase)
+    @property
+    def torques(self) -> Float[np.ndarray, " torques"]:
+        """Torques of the readings, ascending [N m]."""
+        return np.unique(np.asarray(self.torque))
+
+    @property
+    def residual_orders(self) -> Float[np.ndarray, "torques orders"]:
+        """Amplitudes of the mesh orders 1, 2 ... of what the fit leaves, a row per torque [um].
+
+        By least squares; as many orders as the readings of every torque resolve, 8 at most.
+        """
+        every, left = self._rows_of_torques(), np.asarray(self.measured - self.fitted)
+        orders = np.arange(1, max(1, min(_ORDERS, (min(map(len, every)) - 1) // 2)) + 1)
         found = []
-        for level in np.unique(torque):
-            at = torque == level
-            waves = np.exp(-2j * np.pi * np.outer(np.arange(1, orders + 1), phase[at]))
-            found.append(2 * np.abs(waves @ np.asarray(self.measured - self.fitted)[at]) / at.sum())
+        for rows in every:
+            angle = 2 * np.pi * np.outer(np.asarray(self.phase)[rows], orders)
+            waves = np.concatenate([np.ones((len(rows), 1)), np.cos(angle), np.sin(angle)], axis=1)
+            cosine, sine = np.split(np.linalg.lstsq(waves, left[rows])[0][1:], 2)
+            found.append(np.hypot(cosine, sine))
         return np.asarray(found)
+
+    @property
+    def noise_orders(self) -> Float[np.ndarray, " torques"]:
+        """Amplitude of a mesh order that noise alone stays below in 95 of 100 cases, of every torque [um]."""
+        mean = [
+            np.sqrt(np.mean(np.square(np.asarray(self.noise)[rows])) / len(rows)) for rows in self._rows_of_torques()
+        ]
+        return _OF_NOISE * np.asarray(mean)
+
+    def _rows_of_torques(self) -> list[np.ndarray]:
+        return [np.flatnonzero(np.asarray(self.torque) == torque) for torque in self.torques]
 
 
 class _Problem(eqx.Module):
@@ -350,10 +381,10 @@ def identify(
         TypeError: for something else than a prepared mesh.
     """
     check("identify", "model_error", model_error, "", low=0.0, high=1.0)
-    problem, data = _posed(design, prior, measurement, mesh, torque_scale, offset, model_error)
     whole("identify", "steps", steps, low=1)
     for torque in candidates:
         check("identify", "candidates", torque, "N m", low=0.0, open_low=True)
+    problem, data = _posed(design, prior, measurement, mesh, torque_scale, offset, model_error)
     found = _fit(problem, data, steps)
     z = found.z
     more = [_further(problem, z, data, found.size, jnp.asarray(torque, z.dtype)) for torque in candidates]
@@ -400,34 +431,53 @@ def _check_used(design: Design, prior: Prior, mesh: Mesh, torque: float) -> None
         )
 
 
+class _Bins(NamedTuple):
+    """Readings by torque and position of the mesh."""
+
+    torques: np.ndarray
+    level: np.ndarray  # number of the torque of every bin that has readings
+    phase: np.ndarray  # mean of its readings
+    row: np.ndarray  # bin of every reading
+    readings: np.ndarray  # of every bin
+
+    def mean(self, of: Array) -> Array:
+        return jnp.zeros(len(self.level), of.dtype).at[self.row].add(of) / self.readings.astype(of.dtype)
+
+
+def _bins(measurement: Measurement, positions: int, first: float) -> _Bins:
+    phase, torque = np.asarray(measurement.phase, float), np.asarray(measurement.torque, float)
+    torques, level = np.unique(torque, return_inverse=True)
+    place = ((phase - first) % 1) * positions
+    bins = level * positions + np.minimum(place.astype(int), positions - 1)
+    kept, row, readings = np.unique(bins, return_inverse=True, return_counts=True)
+    mean = first + np.bincount(row, place) / readings / positions
+    return _Bins(torques, kept // positions, mean, row, readings)
+
+
+def _noise(measurement: Measurement, bins: _Bins) -> Scalar:
+    if measurement.noise is not None:
+        return measurement.noise
+    value, free = measurement.transmission_error, len(bins.row) - len(bins.level)
+    if free < LEAST_ROWS:
+        raise ValueError(f"identify: noise = None needs {LEAST_ROWS} repeated readings or more, are {free}")
+    noise = jnp.sqrt(jnp.sum((value - bins.mean(value)[bins.row]) ** 2) / free)
+    known = concrete(noise)
+    if known is not None and not known > 0:
+        raise ValueError("identify: repeated readings are all alike, noise must be given [um]")
+    return noise
+
+
 def _joined(measurement: Measurement, mesh: Mesh) -> _Data:
     """Readings of one torque within one position of the mesh, joined into their mean."""
-    phase, torque = np.asarray(measurement.phase, float), np.asarray(measurement.torque, float)
-    value = measurement.transmission_error
-    count, first = mesh.resolution.positions, float(np.asarray(mesh.phase)[0])
-    torques, level = np.unique(torque, return_inverse=True)
-    place = ((phase - first) % 1) * count
-    bins = level * count + np.minimum(place.astype(int), count - 1)
-    kept, row, readings = np.unique(bins, return_inverse=True, return_counts=True)
-
-    def mean(of):
-        return jnp.zeros(len(kept), of.dtype).at[row].add(of) / readings.astype(of.dtype)
-
-    noise, free = measurement.noise, len(phase) - len(kept)
-    if noise is None:
-        if free < LEAST_ROWS:
-            raise ValueError(f"identify: noise = None needs {LEAST_ROWS} repeated readings or more, are {free}")
-        noise = jnp.sqrt(jnp.sum((value - mean(value)[row]) ** 2) / free)
-        known = concrete(noise)
-        if known is not None and not known > 0:
-            raise ValueError("identify: repeated readings are all alike, noise must be given [um]")
+    bins = _bins(measurement, mesh.resolution.positions, float(np.asarray(mesh.phase)[0]))
     dtype = mesh.slice_width.dtype
+    noise = _noise(measurement, bins).astype(dtype)
     return _Data(
-        torques=jnp.asarray(torques, dtype),
-        level=jnp.asarray(kept // count),
-        phase=jnp.asarray(first + np.bincount(row, place) / readings / count, dtype),
-        value=mean(value).astype(dtype),
-        noise=noise.astype(dtype) / jnp.asarray(np.sqrt(readings), dtype),
+        torques=jnp.asarray(bins.torques, dtype),
+        level=jnp.asarray(bins.level),
+        phase=jnp.asarray(bins.phase, dtype),
+        value=bins.mean(measurement.transmission_error).astype(dtype),
+        noise=noise / jnp.asarray(np.sqrt(bins.readings), dtype),
     )
 
 

@@ -1,6 +1,7 @@
 """The study of a measured transmission error: which values of the variables of a design file gave it."""
 
 import csv
+import tempfile
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,12 +10,13 @@ from typing import Any, ClassVar, Self
 import equinox as eqx
 import numpy as np
 
-from ..io import DesignFile, DesignFileError, read_measurement, write_design
+from ..contact import Mesh, Resolution
+from ..io import DesignFile, DesignFileError, read_measurement, write_design, write_flanks, write_rexs
 from ..io.design_file import FileDesign
 from ..io.errors import naming, problem, refused
 from ..io.tolerance_table import quality_classes
 from ..microgeometry import AbstractModification, EndRelief, LeadCrowning, LeadSlope
-from ..numerics import check
+from ..numerics import check, real
 from ..optimize import Identified, Measurement, identify
 from ..report import Table
 from ..tolerance import ToleranceClass
@@ -28,6 +30,8 @@ _OF_LIMIT = 3.0  # limit deviation over standard deviation: nearly all gears of 
 _OF_RANGE = 4.0  # range of a variable over standard deviation
 _OVER_FACE = LeadCrowning, LeadSlope, EndRelief  # the helix tolerance is that of these, the profile's of all others
 _RELATED = 0.7  # least correlation that is said
+_REXS = "identified.rexs"
+_NOISE = "95 % of\nnoise [um]"
 _MOST_PANELS = 5
 _PANEL = 45.0  # height [mm]
 
@@ -98,7 +102,21 @@ class DesignIdentification(AbstractStudy["IdentificationResult"]):
         with naming(design.path):
             prior = _prior(design)
         data = read_measurement(measured, design.pair(), noise=noise)
-        return cls(design, quick, Path(measured), data, prior, torque_scale, offset)
+        study = cls(design, quick, Path(measured), data, prior, torque_scale, offset)
+        try:
+            data.noise_on(study._sizes())
+        except ValueError as error:
+            says = str(error).removeprefix("identify: ")
+            raise DesignFileError("te_um", f"{says}; --noise gives it", study.measured) from None
+        return study
+
+    def _further(self) -> list[float]:
+        """Torques of the file that were not measured [N m]."""
+        return sorted({*self.design.torque_range, self.design.torque} - {*np.asarray(self.measurement.torque).tolist()})
+
+    def _sizes(self) -> Resolution:
+        size = self.design.resolution(max([float(np.max(np.asarray(self.measurement.torque))), *self._further()]))
+        return coarse(size) if self.quick else size
 
     def omits(self) -> str:
         """Nothing: [tolerance] gives priors."""
@@ -106,28 +124,22 @@ class DesignIdentification(AbstractStudy["IdentificationResult"]):
 
     def work_out(self, checkpoints: Checkpoints, stages: Stages) -> "IdentificationResult":
         """The identified variables; keeps no checkpoints."""
-        design = self.design
-        further = sorted({*design.torque_range, design.torque} - {*np.asarray(self.measurement.torque).tolist()})
         stages.begin("preparing the mesh")
-        size = design.resolution(max([float(np.max(np.asarray(self.measurement.torque))), *further]))
-        mesh = design.mesh(coarse(size) if self.quick else size)
+        mesh = self.design.mesh(self._sizes())
         stages.begin("searching the variables")
         try:
             found = identify(
-                _Flanks(design.design),
+                _Flanks(self.design.design),
                 self.prior,
                 self.measurement,
                 mesh=mesh,
                 torque_scale=self.torque_scale or None,
                 offset=self.offset or None,
-                candidates=further,
+                candidates=self._further(),
             )
         except ValueError as error:
-            says = str(error).removeprefix("identify: ")
-            if says.startswith(("noise", "repeated")):
-                raise DesignFileError("te_um", f"{says}; --noise gives it", self.measured) from None
-            raise DesignFileError("variables", says, design.path) from None
-        return IdentificationResult(design, self.measured, found)
+            raise DesignFileError("variables", str(error).removeprefix("identify: "), self.design.path) from None
+        return IdentificationResult(self.design, self.measured, mesh, self.prior, found)
 
 
 def _prior(design: DesignFile) -> dict[str, tuple[float, float]]:
@@ -161,13 +173,17 @@ class IdentificationResult(AbstractStudyResult):
     Attributes:
         design: the design file.
         measured: file of the data.
-        found: what they say.
+        mesh: on which they were compared.
+        prior: mean and standard deviation of every variable.
+        found: what the data say.
     """
 
     assumptions: ClassVar = ("Noise, priors and the error of the model are normally distributed.",)
 
     design: DesignFile
     measured: Path
+    mesh: Mesh
+    prior: Mapping[str, tuple[float, float]]
     found: Identified
 
     def _flanks(self) -> tuple[AbstractModification, AbstractModification]:
@@ -181,12 +197,17 @@ class IdentificationResult(AbstractStudyResult):
             yield name, units[name], *values
 
     def tables(self) -> list[Table]:
-        """One row per unknown."""
+        """One row per unknown, and the mesh orders of what the fit leaves."""
         header = "unknown", "unit", "estimate", "standard\ndeviation", "prior\nmean", "prior\ndeviation"
         result = Table(header, title=f"{self.design.title}: identified from {self.measured.name}")
         for name, unit, *values in self._rows():
             result.add_row(name, unit, *(f"{value:.4g}" for value in values))
-        return [result]
+        amplitudes = self.found.residual_orders
+        columns = "torque\n[N m]", *(f"order {order}\n[um]" for order in range(1, amplitudes.shape[1] + 1)), _NOISE
+        left = Table(columns, title="measured minus fitted: amplitudes of the mesh orders")
+        for torque, *row in zip(self.found.torques, *amplitudes.T, self.found.noise_orders):
+            left.add_row(f"{torque:g}", *(f"{value:.3f}" for value in row))
+        return [result, left]
 
     def verdict(self) -> Iterator[str]:
         """Quality of the fit, related unknowns, what the data cannot tell, and the torque that would tell most."""
@@ -232,7 +253,7 @@ class IdentificationResult(AbstractStudyResult):
             flanks = {}
         return {
             "measured_file": self.measured.name,
-            "torques_Nm": np.unique(np.asarray(found.torque)),
+            "torques_Nm": found.torques,
             "unknowns": {name: dict(zip(keys, row)) for name, *row in self._rows()},
             "correlation": np.asarray(found.correlation),
             "singular_values": np.asarray(found.singular_values),
@@ -240,12 +261,38 @@ class IdentificationResult(AbstractStudyResult):
             "further_torque_Nm": found.best_candidate,
             "chi_square": float(found.chi_square),
             "model_error_um": float(found.model_error),
+            "residual_orders_um": found.residual_orders,
+            "noise_orders_um": found.noise_orders,
             "converged": bool(found.converged),
             **flanks,
         }
 
+    def details(self) -> Iterator[str]:
+        """Why there is no REXS file, where its format has no place for the pair."""
+        if not list(self.failures()):
+            with tempfile.TemporaryDirectory() as folder:
+                yield from self._exchanged(Path(folder) / _REXS)
+
+    def _exchanged(self, path: Path) -> Iterator[str]:
+        """Writes the REXS file, or says why it cannot."""
+        try:
+            write_rexs(path, materials=self.design.materials, **self._pair())
+        except ValueError as error:
+            yield f"{path.name} is not written: {str(error).removeprefix('write_rexs: ')}"
+
+    def _pair(self) -> dict[str, Any]:
+        """The pair with the estimates, as both writers take it."""
+        design, (pinion, wheel) = self.design, self._flanks()
+        case = {name: getattr(design, name) for name in ("torque", "speed", "quality_classes", "title")}
+        return {"pair": design.pair(), "pinion": pinion, "wheel": wheel, **case}
+
+    def _designs(self) -> dict[str, tuple[AbstractModification, AbstractModification]]:
+        """Flanks of the prior means and of the estimates."""
+        before = {name: real(mean) for name, (mean, _) in self.prior.items()}
+        return {"prior": self.design.design(before), "identified": self._flanks()}
+
     def write(self, folder: Path) -> None:
-        """The unknowns, `identified.csv`, and the pair with the estimates, `identified.toml`."""
+        """The unknowns, `identified.csv`, and the pair with the estimates as design file, flanks and REXS file."""
         with (folder / "identified.csv").open("w", newline="", encoding="utf-8") as file:
             writer = csv.writer(file)
             names = "name", "unit", "estimate", "standard_deviation", "prior_mean", "prior_standard_deviation"
@@ -253,17 +300,29 @@ class IdentificationResult(AbstractStudyResult):
             writer.writerows([name, unit, *(f"{value:.7g}" for value in row)] for name, unit, *row in self._rows())
         if list(self.failures()):
             return
-        design, (pinion, wheel) = self.design, self._flanks()
-        given: dict[str, Any] = {"speed": design.speed, "quality_classes": design.quality_classes}
-        path = folder / "identified.toml"
-        write_design(path, design.pair(), torque=design.torque, pinion=pinion, wheel=wheel, title=design.title, **given)
+        write_design(folder / "identified.toml", **self._pair())
+        write_flanks(folder / "flanks.csv", self.mesh, self._designs())
+        list(self._exchanged(folder / _REXS))
 
     def figures(self) -> dict[str, Any]:
+        """Measured and fitted transmission error, and the flanks of prior and estimates within their tolerances."""
+        from .. import plot
+
+        axes: dict[str, Any] = {"identified": self._fit()}
+        if not list(self.failures()):
+            of: dict[str, Any] = {"tolerance": quality_classes(self.design)}
+            axes["k_chart"] = plot.k_chart(self.mesh, self._designs(), **of)
+            if self.mesh.resolution.slices > 1:
+                axes["lead_chart"] = plot.lead_chart(self.mesh, self._designs(), **of)
+        for drawn in axes.values():
+            plot.emphasize(np.ravel(drawn)[0].figure, "identified")
+        return axes
+
+    def _fit(self) -> np.ndarray:
         """Measured and fitted transmission error over the phase, a panel per torque."""
         from .. import plot
 
-        found = self.found
-        torques = np.unique(np.asarray(found.torque))
+        found, torques = self.found, self.found.torques
         shown = torques[np.unique(np.linspace(0, len(torques) - 1, _MOST_PANELS).round().astype(int))]
         size: dict[str, Any] = {"rows": len(shown), "height": _PANEL * len(shown)}
         with plot.figure.report_axes(None, **size) as panels:
@@ -280,4 +339,4 @@ class IdentificationResult(AbstractStudyResult):
                 if number == 0:
                     plot.figure.legend_above(panel)
             panel.set_xlabel("phase [base pitches]")
-        return {"identified": panels}
+        return panels
