@@ -2,16 +2,18 @@
 
 from functools import cache
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from catalogue import SLIDING, gear_pair
+from catalogue import FACE, SLIDING, gear_pair
 
 import jaxgear as jg
 from jaxgear.conditions import solve_case
 from jaxgear.io import DesignFileError, read_measurement
 from jaxgear.optimize import Measurement, identify
+from jaxgear.revolution import Teeth, TeethDeviations, solve_revolution
 from jaxgear.tolerance import ToleranceClass
 
 TORQUES = (30.0, 60.0, 120.0)
@@ -105,6 +107,36 @@ def test_true_values_lie_within_two_deviations_where_finite_elements_made_the_da
 
 
 @pytest.mark.slow
+def test_single_precision_finds_what_double_precision_finds():
+    def single(unknown):
+        return tuple(jg.TipRelief(unknown[gear], jnp.float32(4.0)) for gear in PRIOR)
+
+    given = jax.tree.map(lambda leaf: leaf.astype("float32") if eqx.is_inexact_array(leaf) else leaf, mesh())
+    data = Measurement(*readings(TORQUES), noise=NOISE)
+    result, exact = identify(single, PRIOR, data, mesh=given, offset=10.0), found(TORQUES)
+    assert result.estimate.dtype == "float32" and result.converged
+    np.testing.assert_allclose(result.estimate, exact.estimate, atol=0.02 * np.min(exact.deviation[:2]))
+    np.testing.assert_allclose(result.deviation, exact.deviation, rtol=0.01)
+
+
+@pytest.mark.slow
+def test_lead_modifications_are_found_exactly_without_noise():
+    """Crowning and slope, which the transmission error shows by the softer contact."""
+    true, prior = {"crowning": 6.0, "slope": 4.0}, {"crowning": (8.0, 3.0), "slope": (6.0, 3.0)}
+    meshed = jg.prepare(gear_pair(), resolution=FACE)
+
+    def flanks(unknown):
+        return jg.LeadCrowning(unknown["crowning"]), jg.LeadSlope(unknown["slope"])
+
+    torques, made = (60.0, 120.0), flanks(dict(zip(true, map(jnp.asarray, true.values()))))
+    value = [solve_case(meshed, jnp.asarray(torque), *made).transmission_error for torque in torques]
+    data = Measurement(np.tile(meshed.phase, 2), np.repeat(torques, 8), jnp.concatenate(value), noise=1e-6)
+    result = identify(flanks, prior, data, mesh=meshed, torque_scale=None, model_error=0.0)
+    assert result.converged
+    np.testing.assert_allclose(result.estimate, list(true.values()), atol=1e-6)
+
+
+@pytest.mark.slow
 def test_an_error_of_the_model_widens_the_deviations():
     phase, torque, value = readings(TORQUES)
     error = 0.5 * torque / max(TORQUES) * np.cos(2 * np.pi * phase)
@@ -121,6 +153,52 @@ def test_repeats_tell_the_noise():
     value = value + NOISE * np.random.default_rng(2).standard_normal(len(value))
     result = identify(design, PRIOR, Measurement(phase, torque, value), mesh=mesh(), offset=10.0, steps=1)
     np.testing.assert_allclose(result.noise, NOISE / np.sqrt(30), rtol=0.1)
+
+
+@pytest.mark.slow
+def test_all_pitch_deviations_are_told_once_all_teeth_have_met():
+    """Within two deviations; over one revolution of the wheel the sums of the teeth that met alone are."""
+    pair = gear_pair((16, 17), bores=(20.0, 22.0))
+    mesh, draw = jg.prepare(pair, resolution=SLIDING), np.random.default_rng(3).standard_normal
+    single = [of - of.mean() for of in (2.5 * draw(16), 2.5 * draw(17))]
+    teeth = Teeth(*map(TeethDeviations.from_single_pitch, single))
+    flanks = design(dict(zip(TRUE, map(jnp.asarray, TRUE.values()))))
+    found = solve_revolution(mesh, 60.0, teeth, pinion=flanks[0], wheel=flanks[1])
+    value = np.asarray(found.transmission_error) + NOISE * draw(272 * 16)
+
+    def told(rows):
+        data = Measurement(found.phase[:rows], np.full(rows, 60.0), value[:rows], noise=NOISE)
+        result = identify(design, PRIOR, data, mesh=mesh, offset=10.0, single_pitch=(2.5, 2.5))
+        every = np.concatenate([np.stack(result.single_pitch[gear]) for gear in ("pinion", "wheel")], axis=1)
+        assert result.converged and np.mean(np.abs(every[0] - np.concatenate(single)) < 2 * every[1]) > 0.85
+        assert abs(sum(result.single_pitch["pinion"][0])) < 1e-9
+        return result, every[1]
+
+    whole, deviation = told(272 * 16)
+    assert np.max(deviation) < 0.1 and not any("pitch" in line for line in whole.not_told())
+    np.testing.assert_allclose(whole.estimate[:2], list(TRUE.values()), atol=0.1)
+    turn, deviation = told(17 * 16)
+    assert np.median(deviation) > 1.0
+    # 31 are independent; 17 pairs that meet, with that of the next revolution, tell 17 at most
+    (line,) = (line for line in turn.not_told() if "pitch" in line)
+    assert 13 <= int(line.split()[0]) <= 16 and "their sum alone is seen" in line
+
+
+@pytest.mark.parametrize(
+    "options, says",
+    [
+        ({"offset": None}, "offset must be unknown with pitch deviations"),
+        ({"single_pitch": (2.0, 0.0)}, "single_pitch of the wheel"),
+        ({}, "phase covers 0.94 base pitches, pitch deviations need whole revolutions"),
+        ({"phase": lambda phase: 2 * phase, "prior": {"wheel_pitch_3": (0.0, 1.0)}}, "choose another name"),
+    ],
+)
+def test_pitch_deviations_need_whole_revolutions_and_an_offset(options, says):
+    given = {"offset": 10.0, "single_pitch": (2.0, 2.0), "phase": lambda phase: phase, "prior": PRIOR, **options}
+    columns = np.tile(np.arange(16) / 16, 3), np.repeat(TORQUES, 16), np.arange(48.0)
+    data = Measurement(given.pop("phase")(columns[0]), *columns[1:], noise=NOISE)
+    with pytest.raises(ValueError, match=says):
+        identify(design, given.pop("prior"), data, mesh=mesh(), **given)
 
 
 @pytest.mark.parametrize(
@@ -165,6 +243,13 @@ def rows(columns):
     return "\n".join([",".join(columns), *map(",".join, table)])
 
 
+def test_revolutions_are_counted_where_angles_begin_anew(tmp_path):
+    columns = {"angle_deg": GOOD["phase"] * 360 / 19, **{name: GOOD[name] for name in ("torque_Nm", "te_um")}}
+    (tmp_path / "te.csv").write_text(rows(columns | {"revolution": np.arange(16) % 2 + 1}))
+    read = read_measurement(tmp_path / "te.csv", mesh().pair, noise=0.2)
+    np.testing.assert_allclose(read.phase, GOOD["phase"] + 19 * (np.arange(16) % 2), atol=1e-5)
+
+
 @pytest.mark.parametrize("unit", ["phase", "angle_deg"])
 def test_a_file_is_read_by_phase_or_angle(tmp_path, unit):
     columns = {(unit if name == "phase" else name): column for name, column in GOOD.items()}
@@ -186,6 +271,7 @@ def test_a_file_is_read_by_phase_or_angle(tmp_path, unit):
         (GOOD | {"te_um": 1e-6 * GOOD["te_um"]}, "te_um: varies by 1.5e-05 um only"),
         (GOOD | {"te_um": 1e3 * GOOD["te_um"]}, "te_um: varies by 15000 um"),
         (GOOD | {"te_um": np.where(GOOD["te_um"] > 9, np.nan, 1.0)}, 'te_um of point 11 is "nan", must be a number'),
+        (GOOD | {"revolution": 0.5 * np.arange(16)}, "revolution: must be whole numbers"),
         (GOOD | {"phase": 0.5 * GOOD["phase"]}, "phase: does not cover a base pitch at 30 N m"),
         ({name: column[:10] for name, column in GOOD.items()}, "phase: has 10 rows, must have 12 at least"),
         (GOOD | {"torque_Nm": -GOOD["torque_Nm"]}, "torque_Nm: "),

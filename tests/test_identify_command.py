@@ -62,6 +62,7 @@ class Search:
         names, count = (*prior, "torque_scale"), len(prior) + 1
         return Identified(
             names=names,
+            own=count,
             estimate=jnp.full(count, self.height),
             deviation=jnp.full(count, 0.5),
             correlation=0.8 + 0.2 * jnp.eye(count),

@@ -198,6 +198,9 @@ def identify(
     offset: Annotated[
         float, typer.Option(metavar="UM", help="Standard deviation of an offset of all readings in um, 0 for none.")
     ] = 0.0,
+    pitch: Annotated[
+        bool, typer.Option("--pitch", help="Pitch deviations are unknown too, from readings of whole revolutions.")
+    ] = False,
     quick: Quick = False,
     no_figures: NoFigures = False,
     reported: Reported = False,
@@ -208,7 +211,7 @@ def identify(
     The file has the columns torque_Nm, te_um, and phase (base pitches) or angle_deg (of the pinion).
     """
     shared = {"no_figures": no_figures, "reported": reported, "no_cache": no_cache}
-    unknown: dict[str, Any] = {"noise": noise, "torque_scale": torque_scale, "offset": offset}
+    unknown: dict[str, Any] = {"noise": noise, "torque_scale": torque_scale, "offset": offset, "pitch": pitch}
     place = "jaxgear.studies.identification:DesignIdentification"
     return _run(place, context, file, output, **shared, measured=measured, quick=quick, **unknown)
 

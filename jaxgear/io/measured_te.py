@@ -13,7 +13,8 @@ from .flanks import numbers_of
 from .rows import read_rows
 
 _PHASE, _ANGLE, _TORQUE, _ERROR = "phase", "angle_deg", "torque_Nm", "te_um"
-_ALLOWED = _PHASE, _ANGLE, _TORQUE, _ERROR, "revolution", "repeat"  # the last two are joined
+_TURN = "revolution"
+_ALLOWED = _PHASE, _ANGLE, _TORQUE, _ERROR, _TURN, "repeat"
 _MOST_ERROR = 2000.0  # [um]; beyond it the column is in another unit
 _LEAST_ERROR = 1e-3
 _MOST_STRESS = 500.0  # tangential force over face width and module [MPa]: several times what case-hardened gears carry
@@ -22,8 +23,9 @@ _MOST_STRESS = 500.0  # tangential force over face width and module [MPa]: sever
 def read_measurement(path: str | Path, pair: GearPair, *, noise: float | None = None) -> Measurement:
     """Reads a measured transmission error.
 
-    Columns are `torque_Nm`, `te_um`, and `phase` in base pitches or `angle_deg` of the pinion; `revolution` and
-    `repeat` may be there too: whatever was read at one torque and mesh position is joined, its scatter is the noise.
+    Columns are `torque_Nm`, `te_um`, and `phase` in base pitches or `angle_deg` of the pinion; `revolution` of the
+    pinion, which counts where these begin anew with each, and `repeat` may be there too. Whatever was read at one
+    torque and mesh position is joined, its scatter is the noise.
 
     Args:
         path: CSV file in UTF-8, or Parquet.
@@ -38,7 +40,14 @@ def read_measurement(path: str | Path, pair: GearPair, *, noise: float | None = 
         rows = read_rows(path)
         column = _place(rows[0])
         place, torque, error = (numbers_of(rows, name) for name in (column, _TORQUE, _ERROR))
-        phase = place * float(pair.pinion.teeth) / 360 if column == _ANGLE else place
+        teeth = float(pair.pinion.teeth)
+        phase = place * teeth / 360 if column == _ANGLE else place
+        if _TURN in rows[0]:
+            turn = numbers_of(rows, _TURN)
+            if (turn % 1).any():
+                raise DesignFileError(_TURN, "must be whole numbers, of revolutions of the pinion")
+            # without effect where teeth are equal
+            phase = phase + teeth * (turn - turn.min()) * (np.ptp(phase) <= teeth)
         _check_units(pair, torque, error)
         try:
             return Measurement(real(phase), real(torque), real(error), optional_real(noise))

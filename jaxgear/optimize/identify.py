@@ -1,101 +1,54 @@
 """What flanks gave a measured transmission error: named unknowns with the uncertainty that the data leave."""
 
 from collections.abc import Mapping, Sequence
-from functools import partial
+from math import lcm
 from typing import NamedTuple
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+import scipy  # its packages load when they are used
 from jaxtyping import Array, Bool, Float
 
 from ..conditions import Design, Variants, conditions, solve_case, two_modifications
-from ..contact import Mesh, Resolution
+from ..conditions.join import side_by_side
+from ..contact import Mesh, removed_material
 from ..contact.solve import check_mesh
-from ..numerics import Checked, check, concrete, number, pivots, program, result, solve_dense, whole
+from ..contact.status import Status
+from ..geometry import GearPair
+from ..numerics import Checked, check, program, result, solve_dense, whole
+from ..revolution import Teeth
+from ..revolution.solve import GEARS, GearName, displaced, pairs_in_window
+from .measurement import ORDERS, Data, Measurement, errors_of, joined
 
 Scalar = Float[Array, ""]
 Rows = Float[Array, " rows"]
 Vector = Float[Array, " unknowns"]
 Prior = Mapping[str, tuple[float, float]]
+Pitches = tuple[float | None, float | None]
 
 TORQUE_SCALE, OFFSET = "torque_scale", "offset"  # unknowns of the test rig
-LEAST_ROWS = 12  # of a measurement
 _BOTH = 2**0.5  # the error alike at all torques and that of each add up in squares
-_LARGEST_GAP = 0.25  # between neighbouring phases of one torque [base pitches]: the first three mesh orders are seen
-# The error of the model: mesh orders of it, and its size relative to the noise that is looked at.
-_ORDERS = 8
-_SIZES = 10.0 ** np.arange(-2.0, 3.01, 0.25)
+_SIZES = 10.0 ** np.arange(-2.0, 3.01, 0.25)  # of the error of the model that are looked at, relative to the noise
 _TOLD = 1.0  # least singular value of what the data say more about than the prior
 _NAMED = 0.3  # least share in a combination that is named
+_CHIEFLY = 0.5  # share of pitch deviations, in squares, in a combination that is theirs
 _DAMPING = 100.0  # of the first step, which prior deviations measure
 _SETTLED = 0.05  # largest move at the end, in prior standard deviations
+_LAST = 1e-9  # move that ends the search
 _ROUND_OFF = 1e-9
+_EQUAL = None, None  # teeth of both gears
 _OF_NOISE = 2 * (-np.log(0.05)) ** 0.5  # 95 % of amplitudes by Rayleigh's law, over noise and root of the readings
-_NOTHING = 1e6  # noises between the data and what is not known
-
-
-class Measurement(Checked):
-    """A measured transmission error, a row per reading.
-
-    Attributes:
-        phase: mesh position; readings of several base pitches are folded into one.
-        torque: on the pinion.
-        transmission_error: along the line of action, positive when the wheel lags.
-        noise: standard deviation of a reading; None for that of repeats, of readings of one torque within one mesh
-            position.
-
-    Raises:
-        ValueError: for less than 12 readings, columns of different lengths, numbers that are not finite, or phases
-            of a torque that leave more than a quarter of the base pitch out.
-    """
-
-    phase: Rows = number("base pitches", shape=("rows",))
-    torque: Rows = number("N m", low=0.0, open_low=True, shape=("rows",))
-    transmission_error: Rows = number("um", shape=("rows",))
-    noise: Scalar | None = number("um", low=0.0, open_low=True, optional=True, default=None)
-
-    def __check_init__(self) -> None:
-        counts = {name: len(getattr(self, name)) for name in ("phase", "torque", "transmission_error")}
-        if min(counts.values()) < LEAST_ROWS:
-            raise ValueError(f"Measurement: phase has {counts['phase']} rows, must have {LEAST_ROWS} at least")
-        if len(set(counts.values())) > 1:
-            raise ValueError(f"Measurement: torque has {counts['torque']} rows, phase {counts['phase']}")
-        phase, torque = np.asarray(self.phase) % 1, np.asarray(self.torque)
-        for level in np.unique(torque):
-            places = np.sort(phase[torque == level])
-            gap = float(np.diff(places, append=places[0] + 1).max())
-            if gap > _LARGEST_GAP:
-                raise ValueError(
-                    f"Measurement: phase does not cover a base pitch at {level:g} N m: {gap:.2g} of it are without a "
-                    f"reading, must be {_LARGEST_GAP:g} at most"
-                )
-
-    def noise_on(self, resolution: Resolution) -> Scalar:
-        """Standard deviation of a reading [um], given or of readings of one torque within one position of the mesh.
-
-        Raises:
-            ValueError: for none that is given and too few repeats, or repeats that are all alike.
-        """
-        return _noise(self, _bins(self, resolution.positions, float(np.asarray(resolution.first_phase))))
-
-
-class _Data(eqx.Module):
-    """Readings joined per torque and position of the mesh: what a compiled fit takes."""
-
-    torques: Float[Array, " torques"]
-    level: Array  # number of the torque of every row
-    phase: Rows
-    value: Rows
-    noise: Rows
 
 
 class Identified(Checked):
     """What the data say about the unknowns, besides the prior.
 
     Attributes:
-        names: of the unknowns; those of the design, then "torque_scale" and "offset" where they are unknown.
+        names: of the unknowns; those of the design, "torque_scale" and "offset" where they are unknown, then single
+            pitch deviations, "pinion_pitch_0" ..., of which one less per gear is independent.
+        own: how many of them, the first, are not pitch deviations.
         estimate: their most probable values, in their units.
         deviation: standard deviations, that of the error of the model included.
         correlation: of the unknowns, shape (unknowns, unknowns).
@@ -111,16 +64,17 @@ class Identified(Checked):
             as good as the data.
         converged: whether the steps ended and all contact solutions converged.
         candidates: further torques, shape (candidates,).
-        told_by_candidates: singular values of the data together with each of them, shape (candidates, unknowns).
+        told_by_candidates: singular values of the data together with each of them, shape (candidates, independent).
     """
 
     names: tuple[str, ...] = eqx.field(static=True)
+    own: int = eqx.field(static=True)
     estimate: Vector = result()
     deviation: Vector = result()
     correlation: Float[Array, "unknowns unknowns"] = result()
     prior: Float[Array, "2 unknowns"] = result()
-    singular_values: Vector = result()
-    directions: Float[Array, "unknowns unknowns"] = result()
+    singular_values: Float[Array, " independent"] = result()
+    directions: Float[Array, "independent unknowns"] = result()
     torque: Rows = result("N m")
     phase: Rows = result("base pitches")
     measured: Rows = result("um")
@@ -130,7 +84,7 @@ class Identified(Checked):
     chi_square: Scalar = result()
     converged: Bool[Array, ""] = result()
     candidates: Float[Array, " candidates"] = result("N m")
-    told_by_candidates: Float[Array, "candidates unknowns"] = result()
+    told_by_candidates: Float[Array, "candidates independent"] = result()
 
     @property
     def best_candidate(self) -> float | None:
@@ -145,16 +99,33 @@ class Identified(Checked):
 
     def not_told(self) -> list[str]:
         """What the data cannot tell, a line per combination: of it the prior says more than they do."""
-        lines = []
-        for value, direction in zip(np.asarray(self.singular_values), np.asarray(self.directions)):
+        lines, values, directions = [], np.asarray(self.singular_values), np.asarray(self.directions)
+        of_pitch = np.sum(directions[:, self.own :] ** 2, axis=1) > _CHIEFLY
+        for value, direction in zip(values[~of_pitch], directions[~of_pitch]):
             if value < _TOLD:
-                chief = [(share, name) for share, name in zip(direction, self.names) if abs(share) >= _NAMED]
+                least = min(_NAMED, np.max(np.abs(direction)))
+                chief = [(share, name) for share, name in zip(direction, self.names) if abs(share) >= least]
                 sign = np.sign(chief[0][0])
                 words = " ".join(f"{'+' if sign * share > 0 else '-'} {name}" for share, name in chief)
                 left = 1 / np.sqrt(1 + value**2)
                 what = "cannot be told" if len(chief) < 2 else "cannot be told apart"
                 lines.append(f"{words.removeprefix('+ ')} {what}: {left:.0%} of the prior deviation is left")
+        if unseen := np.sum(values[of_pitch] < _TOLD):
+            lines.append(
+                f"{unseen} combinations of {len(self.names) - self.own} pitch deviations cannot be told: of two teeth "
+                "that meet their sum alone is seen, until all have met"
+            )
         return lines
+
+    @property
+    def single_pitch(self) -> dict[GearName, tuple[Vector, Vector]]:
+        """Single pitch deviations and their standard deviations, where they were unknown, by gear [um]."""
+        found = {}
+        for gear in GEARS:
+            at = np.array([place for place, name in enumerate(self.names[self.own :]) if name.startswith(gear)], int)
+            if len(at):
+                found[gear] = self.estimate[self.own + at], self.deviation[self.own + at]
+        return found
 
     @property
     def torques(self) -> Float[np.ndarray, " torques"]:
@@ -168,7 +139,7 @@ class Identified(Checked):
         By least squares; as many orders as the readings of every torque resolve, 8 at most.
         """
         every, left = self._rows_of_torques(), np.asarray(self.measured - self.fitted)
-        orders = np.arange(1, max(1, min(_ORDERS, (min(map(len, every)) - 1) // 2)) + 1)
+        orders = np.arange(1, max(1, min(ORDERS, (min(map(len, every)) - 1) // 2)) + 1)
         found = []
         for rows in every:
             angle = 2 * np.pi * np.outer(np.asarray(self.phase)[rows], orders)
@@ -190,46 +161,69 @@ class Identified(Checked):
 
 
 class _Problem(eqx.Module):
+    """What a fit searches.
+
+    Attributes:
+        names: of the unknowns.
+        own: how many of them are not pitch deviations, the first.
+        turn: the unknowns, in their prior deviations, from independent ones of which pitch deviations have one less
+            per gear than there are teeth.
+        gaps: by how much the pairs of every window are apart, from those of the independent unknowns that are pitch
+            pitch deviations [um].
+        least_error: size of the shapes of the error of the model.
+    """
+
     design: Design
     names: tuple[str, ...] = eqx.field(static=True)
+    own: int = eqx.field(static=True)
     mesh: Mesh
     mean: Vector
     spread: Vector
-    least_error: Scalar  # size of the shapes of the error of the model
+    turn: Float[Array, "unknowns independent"]
+    gaps: Float[Array, "windows pairs pitches"]
+    least_error: Scalar
 
-    def parameters(self, z: Vector) -> dict[str, Scalar]:
-        return dict(zip(self.names, self.mean + self.spread * z))
-
-    def curves(self, z: Vector, torques: Array) -> tuple[Array, Bool[Array, ""]]:
-        """Transmission error over the positions of the mesh, a row per torque."""
-        given = self.parameters(z)
+    def curves(
+        self, own: Vector, apart: Float[Array, "windows pairs"], shift: Array, torques: Array
+    ) -> tuple[Array, Bool[Array, ""]]:
+        """Transmission error over the places of all windows, a row per torque."""
+        given = dict(zip(self.names, self.mean[: self.own] + self.spread[: self.own] * own))
         pinion, wheel = two_modifications(self.design(given))
-        scale, offset = given.get(TORQUE_SCALE, jnp.ones_like(z[0])), given.get(OFFSET, jnp.zeros_like(z[0]))
+        scale, offset = given.get(TORQUE_SCALE, jnp.ones_like(own[0])), given.get(OFFSET, jnp.zeros_like(own[0]))
 
         def at(torque: Scalar):
-            cycle = solve_case(self.mesh, torque * scale, pinion, wheel)
-            return cycle.transmission_error + offset, jnp.all(cycle.converged)
+            removed = removed_material(self.mesh, torque * scale, pinion=pinion, wheel=wheel)
+
+            def window(gap: Array):
+                cycle, status = displaced(self.mesh, torque * scale, removed, gap + jnp.pad(shift, 1))
+                return cycle.transmission_error + offset, status == Status.CONVERGED
+
+            # whole batches only: a rest would be a program of its own
+            size = min(side_by_side(self.mesh), len(apart))
+            whole = jnp.pad(apart, ((0, -len(apart) % size), (0, 0)), mode="edge")
+            found, fine = jax.lax.map(window, whole, batch_size=size)
+            return found[: len(apart)].ravel(), jnp.all(fine)
 
         found, fine = jax.vmap(at)(torques)
         return found, jnp.all(fine)
 
-    def rows(self, z: Vector, data: _Data) -> tuple[Rows, Bool[Array, ""]]:
-        """At the readings, between positions of the mesh by a straight line."""
-        found, fine = self.curves(z, data.torques)
-        count = found.shape[1]
-        place = (data.phase - self.mesh.phase[0]) * count
-        before = jnp.floor(place)
-        share, first = place - before, before.astype(int)
-        left, right = (found[data.level, number % count] for number in (first, first + 1))
-        return left + share * (right - left), fine
+    def jacobian(self, z: Vector, data: Data) -> tuple[Array, Rows, Bool[Array, ""]]:
+        """Slopes by the independent unknowns, values at the readings, and whether all contacts converged.
 
-    def jacobian(self, z: Vector, data: _Data) -> tuple[Array, Rows, Bool[Array, ""]]:
-        def twice(z: Vector) -> tuple[Rows, tuple[Rows, Bool[Array, ""]]]:
-            values, fine = self.rows(z, data)
+        A window sees its own pairs alone: what they do to it when they are displaced, alike in all windows at once,
+        gives the slopes by the pitch deviations of all teeth.
+        """
+        own, pitch = jnp.split(z, [self.own])
+        apart, shift = self.gaps @ pitch, jnp.zeros(self.mesh.resolution.chosen_pairs, z.dtype)
+
+        def twice(of):
+            values, fine = self.curves(of[0], apart, of[1], data.torques)
             return values, (values, fine)
 
-        slopes, (values, fine) = jax.jacfwd(twice, has_aux=True)(z)
-        return slopes, values, fine
+        (slopes, by_pair), (values, fine) = jax.jacfwd(twice, has_aux=True)((own, shift))
+        by_pair = by_pair.reshape(len(by_pair), len(apart), -1, len(shift))
+        by_pitch = jnp.einsum("twpk,wku->twpu", by_pair, self.gaps[:, 1:-1]).reshape(*slopes.shape[:2], len(pitch))
+        return data.at(jnp.concatenate([slopes, by_pitch], axis=-1)), data.at(values), fine
 
 
 class _Fit(NamedTuple):
@@ -242,106 +236,71 @@ class _Fit(NamedTuple):
     fine: Bool[Array, ""]
 
 
-def _error_shapes(data: _Data) -> Float[Array, "rows shapes"]:
-    """Curves of unit size that a stiffness in error adds: alike at all torques, and each torque its own.
-
-    Proportional to the torque; the amplitude of a mesh order falls with its number.
-    """
-    order = jnp.arange(1, _ORDERS + 1, dtype=data.phase.dtype)
-    angle = 2 * jnp.pi * data.phase[:, None] * order[None]
-    waves = jnp.concatenate([jnp.cos(angle) / order[None], jnp.sin(angle) / order[None]], axis=1)
-    load = (data.torques / jnp.max(data.torques))[data.level]
-    alike = load[:, None] * jnp.concatenate([jnp.ones_like(waves[:, :1]), waves], axis=1)
-    own = jax.nn.one_hot(data.level, data.torques.shape[0], dtype=alike.dtype)
-    return jnp.concatenate([alike, (own[:, :, None] * alike[:, None, :]).reshape(alike.shape[0], -1)], axis=1)
-
-
-class _Errors(NamedTuple):
-    """Noise and error of the model, turned so that both are independent: sums of readings in noises.
-
-    Attributes:
-        turn: the sums, a row each.
-        variance: of the error of the model in every one, where its shapes have unit size.
-    """
-
-    turn: Float[Array, "rows rows"]
-    variance: Rows
-
-    def whitened(self, size: Scalar, of: Array) -> Array:
-        """Columns of readings, in standard deviations."""
-        deviation = jnp.sqrt(1 + size**2 * self.variance)
-        return (self.turn @ of) / deviation.reshape(-1, *[1] * (of.ndim - 1))
-
-
-def _errors(data: _Data) -> _Errors:
-    shapes = _error_shapes(data) / data.noise[:, None]
-    variance, turn = jnp.linalg.eigh(shapes @ shapes.T)
-    return _Errors(turn.T / data.noise[None], jnp.maximum(variance, 0.0))
-
-
-def _evidence(errors: _Errors, size: Scalar, slopes: Array, left: Rows) -> Scalar:
-    """Logarithm of the probability of the data under an error of the model of this size, the unknowns integrated."""
-    a, r = errors.whitened(size, slopes), errors.whitened(size, left)
-    normal, b = jnp.eye(a.shape[1], dtype=a.dtype) + a.T @ a, a.T @ r
-    determinant = jnp.sum(jnp.log1p(size**2 * errors.variance)) + jnp.sum(jnp.log(pivots(normal)))
-    return -0.5 * (r @ r - b @ solve_dense(normal, b) + determinant)
+def _directions(slopes: Float[Array, "sums unknowns"]) -> tuple[Vector, Float[Array, "unknowns unknowns"]]:
+    """Singular values and right singular vectors, of as many as there are unknowns."""
+    missing = max(slopes.shape[1] - slopes.shape[0], 0)
+    _, singular, directions = jnp.linalg.svd(jnp.pad(slopes, ((0, missing), (0, 0))), full_matrices=False)
+    return singular, directions
 
 
 @program
-def _fit(problem: _Problem, data: _Data, steps: int) -> _Fit:
+def _fit(problem: _Problem, data: Data, steps: int) -> _Fit:
     """Gauss-Newton with Levenberg's damping; the size of the error of the model is a mean by probability."""
-    errors = _errors(data)
+    errors = errors_of(data)
     sizes = jnp.asarray(_SIZES, data.value.dtype) * jnp.mean(data.noise)
+    count = problem.turn.shape[1]
+    unit = jnp.eye(count, dtype=data.value.dtype)
 
-    def white(z, slopes, values):
-        left = data.value - values + slopes @ z
-        weight = jax.nn.softmax(jax.vmap(lambda size: _evidence(errors, size, slopes, left))(sizes))
+    def judged(z: Vector, slopes: Array, *values: Rows) -> tuple[Scalar, Array]:
+        """Size of the error of the model, and products of slopes and of what all values leave."""
+        products = errors.products(jnp.stack([*slopes.T, *(data.value - each for each in values)], axis=1))
+        weight = jax.nn.softmax(jax.vmap(lambda size: errors.evidence(size, products(size), z))(sizes))
         size = jnp.sqrt(weight @ sizes**2 + problem.least_error**2)
-        return size, partial(errors.whitened, size)
+        return size, products(size)
 
-    def step(state, _):
-        z, slopes, values, damping, move = state
+    def step(state):
+        number, _, z, slopes, values, damping, move = state
         new_slopes, new_values, fine = problem.jacobian(z + move, data)
-        _, whiten = white(z, slopes, values)
-        old, new = whiten(data.value - values), whiten(data.value - new_values)
-        better = fine & (new @ new + (z + move) @ (z + move) <= (old @ old + z @ z) * (1 + _ROUND_OFF))
+        _, product = judged(z, slopes, values, new_values)
+        old, new = product[count, count] + z @ z, product[count + 1, count + 1] + (z + move) @ (z + move)
+        better = fine & ((number == 0) | (new <= old * (1 + _ROUND_OFF)))  # at first nothing is known
         z = jnp.where(better, z + move, z)
         slopes, values = jnp.where(better, new_slopes, slopes), jnp.where(better, new_values, values)
         damping = jnp.clip(jnp.where(better, 0.1 * damping, 10 * damping), 1e-3, 1e6)
-        _, whiten = white(z, slopes, values)
-        a, r = whiten(slopes), whiten(data.value - values)
-        normal = a.T @ a + (1 + damping) * jnp.eye(z.shape[0], dtype=z.dtype)
-        return (z, slopes, values, damping, solve_dense(normal, a.T @ r - z)), better
+        _, product = judged(z, slopes, values)
+        move = solve_dense(product[:count, :count] + (1 + damping) * unit, product[:count, count] - z)
+        return number + 1, better, z, slopes, values, damping, move
 
-    # before the first step nothing is known, and whatever it finds is better
-    z = jnp.zeros_like(problem.mean)
-    slopes = jnp.zeros((data.value.shape[0], z.shape[0]), z.dtype)
-    start = (z, slopes, data.value + _NOTHING * data.noise, jnp.asarray(_DAMPING, z.dtype), z)
-    (z, slopes, values, _, move), accepted = jax.lax.scan(step, start, None, length=steps)
-    fine = jnp.any(accepted) & (jnp.max(jnp.abs(move)) < _SETTLED)
-    size, whiten = white(z, slopes, values)
-    a = whiten(slopes)
-    unit = jnp.eye(z.shape[0], dtype=z.dtype)
-    covariance = solve_dense(a.T @ a + unit, unit)
-    _, singular, directions = jnp.linalg.svd(a, full_matrices=False)
-    return _Fit(z, covariance, singular, directions, values, size, fine)
+    z = jnp.zeros(count, data.value.dtype)
+    slopes = jnp.zeros((data.value.shape[0], count), z.dtype)
+    start = (0, jnp.asarray(False), z, slopes, jnp.zeros_like(data.value), jnp.asarray(_DAMPING, z.dtype), z)
+
+    def goes_on(state):
+        number, better, *_, move = state
+        return (number < steps) & ((number == 0) | ~better | (jnp.max(jnp.abs(move)) > _LAST))
+
+    _, _, z, slopes, values, _, move = jax.lax.while_loop(goes_on, step, start)
+    fine = jnp.any(slopes != 0) & (jnp.max(jnp.abs(move)) < _SETTLED)
+    size, product = judged(z, slopes, values)
+    covariance = solve_dense(product[:count, :count] + unit, unit)
+    return _Fit(z, covariance, *_directions(errors.whitened(size, slopes)), values, size, fine)
 
 
 @program
-def _further(problem: _Problem, z: Vector, data: _Data, size: Scalar, candidate: Scalar) -> Vector:
+def _further(problem: _Problem, z: Vector, data: Data, size: Scalar, candidate: Scalar) -> Vector:
     """Singular values with a further torque, read at every position of the mesh with the noise of the data."""
-    torques = jnp.append(data.torques, candidate)
-    phase = problem.mesh.phase.astype(data.phase.dtype)
-    more = _Data(
-        torques,
-        jnp.concatenate([data.level, jnp.full(phase.shape, data.torques.shape[0], data.level.dtype)]),
-        jnp.concatenate([data.phase, phase]),
-        jnp.concatenate([data.value, jnp.zeros_like(phase)]),
-        jnp.concatenate([data.noise, jnp.full_like(phase, jnp.mean(data.noise))]),
-    )
+    torques, windows = jnp.append(data.torques, candidate), len(problem.gaps)
+    phase = jnp.tile(problem.mesh.phase.astype(data.phase.dtype), windows)
+    places = jnp.arange(len(phase))
+    level = jnp.full(phase.shape, data.torques.shape[0])
+    noise = jnp.full_like(phase, jnp.mean(data.noise))
+    zero = jnp.zeros_like(phase)
+    every = Data(torques, level, places, places, zero, phase, zero, noise)
+    more = jax.tree.map(lambda *parts: jnp.concatenate(parts), data, every)
+    more = eqx.tree_at(lambda of: of.torques, more, torques)
     slopes, _, _ = problem.jacobian(z, more)
     grown = size * jnp.max(torques) / jnp.max(data.torques)  # the shapes are those at the largest torque
-    return jnp.linalg.svd(_errors(more).whitened(grown, slopes), compute_uv=False)
+    return _directions(errors_of(more).whitened(grown, slopes))[0]
 
 
 def identify(
@@ -352,6 +311,7 @@ def identify(
     mesh: Mesh,
     torque_scale: float | None = 0.01,
     offset: float | None = None,
+    single_pitch: Pitches | None = None,
     model_error: float = 0.02,
     candidates: Sequence[float] = (),
     steps: int = 25,
@@ -371,20 +331,24 @@ def identify(
         mesh: prepared mesh.
         torque_scale: standard deviation of the factor between measured and true torque; None for a right one.
         offset: standard deviation of what is added to every reading [um]; None for absolute readings.
+        single_pitch: standard deviations of the single pitch deviations of pinion and wheel, see `TeethDeviations`
+            [um]; None for equal teeth, of one gear or both. Readings are then those of teeth that differ, and `offset`
+            must be unknown. Which teeth they are the mesh position says: pair n is tooth n mod z1 on tooth n mod z2.
         model_error: standard deviation of the error of the mean deflection, relative to it; 0.02 is that of the default
             structure against finite elements. What the residual shows comes on top.
         candidates: further torques that could be measured [N m].
         steps: of the search.
 
     Raises:
-        ValueError: for a prior that is not positive, an unknown on which nothing depends, or no noise without repeats.
+        ValueError: for a prior that is not positive, an unknown on which nothing depends, or no noise without repeats,
+            or pitch deviations without an offset.
         TypeError: for something else than a prepared mesh.
     """
     check("identify", "model_error", model_error, "", low=0.0, high=1.0)
     whole("identify", "steps", steps, low=1)
     for torque in candidates:
         check("identify", "candidates", torque, "N m", low=0.0, open_low=True)
-    problem, data = _posed(design, prior, measurement, mesh, torque_scale, offset, model_error)
+    problem, data = _posed(design, prior, measurement, mesh, torque_scale, offset, single_pitch, model_error)
     found = _fit(problem, data, steps)
     z = found.z
     more = [_further(problem, z, data, found.size, jnp.asarray(torque, z.dtype)) for torque in candidates]
@@ -399,8 +363,9 @@ def _posed(
     mesh: Mesh,
     scale: float | None,
     offset: float | None,
+    single_pitch: Pitches | None,
     model_error: float,
-) -> tuple[_Problem, _Data]:
+) -> tuple[_Problem, Data]:
     check_mesh("identify", mesh)
     if not prior:
         raise ValueError("identify: prior must name at least one unknown")
@@ -413,12 +378,60 @@ def _posed(
     for name, (middle, known) in every.items():
         check("identify", f"prior mean of {name}", middle, "")
         check("identify", f"prior standard deviation of {name}", known, "", low=0.0, open_low=True)
-    data = _joined(measurement, mesh)
+    period, own, spreads = period_of(measurement, mesh.pair, single_pitch, offset), len(every), single_pitch or _EQUAL
+    counts = Teeth().counts_of(mesh.pair)
+    for gear, count, known in zip(GEARS, counts, spreads):
+        if known is not None:
+            pitches = {f"{gear}_pitch_{tooth}": (0.0, known) for tooth in range(count)}
+            if taken := pitches.keys() & every.keys():
+                raise ValueError(f"identify: prior names {min(taken)}, a pitch deviation: choose another name")
+            every |= pitches
+    data, windows = joined(measurement, mesh, period)
     mean, spread = (jnp.asarray([known[end] for known in every.values()], data.value.dtype) for end in (0, 1))
     _check_used(design, prior, mesh, float(np.min(np.asarray(measurement.torque))))
     cycle = solve_case(mesh, data.torques[-1], *two_modifications(design(dict(zip(prior, mean)))))
     deflection = jnp.mean(cycle.transmission_error - cycle.unloaded_transmission_error)
-    return _Problem(design, tuple(every), mesh, mean, spread, model_error * deflection / _BOTH), data
+    differ = [_closed(count) for count, known in zip(counts, spreads) if known is not None]
+    turn = scipy.linalg.block_diag(np.eye(own), *differ)
+    gaps = jnp.asarray(_gaps(mesh, windows, counts, spreads), spread.dtype)
+    least = model_error * deflection / _BOTH
+    return _Problem(design, tuple(every), own, mesh, mean, spread, jnp.asarray(turn, spread.dtype), gaps, least), data
+
+
+def period_of(measurement: Measurement, pair: GearPair, single_pitch: Pitches | None, offset: float | None) -> int:
+    """Base pitches after which the same teeth meet, of those whose pitch deviations are unknown; 1 for equal teeth.
+
+    Raises:
+        ValueError: for standard deviations that are not positive, no unknown offset, or readings of one base pitch.
+    """
+    if single_pitch is None:
+        return 1
+    for gear, known in zip(GEARS, single_pitch):
+        if known is not None:
+            check("identify", f"single_pitch of the {gear}", known, "um", low=0.0, open_low=True)
+    if offset is None:
+        raise ValueError("identify: offset must be unknown with pitch deviations, no tooth is the right one")
+    covered = float(np.ptp(np.asarray(measurement.phase)))
+    if covered <= 1:
+        raise ValueError(f"identify: phase covers {covered:.2g} base pitches, pitch deviations need whole revolutions")
+    return lcm(*(count for count, known in zip(Teeth().counts_of(pair), single_pitch) if known is not None))
+
+
+def _closed(teeth: int) -> Float[np.ndarray, "teeth independent"]:
+    """Single pitch deviations that close around the gear, from one less that are independent; orthonormal."""
+    return np.linalg.qr(np.eye(teeth) - 1 / teeth)[0][:, :-1]
+
+
+def _gaps(mesh: Mesh, windows: np.ndarray, counts: Sequence[int], spreads: Sequence[float | None]) -> np.ndarray:
+    """As of `_Problem`: cumulative pitch deviations, around their mean, of both teeth of every pair."""
+    numbers = windows[:, None] + pairs_in_window(mesh.resolution)
+    found = [np.zeros((*numbers.shape, 0))]
+    for gear, count, spread in zip(mesh.pair.gears, counts, spreads):
+        if spread is not None:
+            total = np.cumsum(_closed(count), axis=0)
+            along_line = spread * float(jnp.cos(gear.transverse_pressure_angle))
+            found.append(along_line * (total - total.mean(axis=0))[numbers % count])
+    return np.concatenate(found, axis=-1)
 
 
 def _check_used(design: Design, prior: Prior, mesh: Mesh, torque: float) -> None:
@@ -431,68 +444,21 @@ def _check_used(design: Design, prior: Prior, mesh: Mesh, torque: float) -> None
         )
 
 
-class _Bins(NamedTuple):
-    """Readings by torque and position of the mesh."""
-
-    torques: np.ndarray
-    level: np.ndarray  # number of the torque of every bin that has readings
-    phase: np.ndarray  # mean of its readings
-    row: np.ndarray  # bin of every reading
-    readings: np.ndarray  # of every bin
-
-    def mean(self, of: Array) -> Array:
-        return jnp.zeros(len(self.level), of.dtype).at[self.row].add(of) / self.readings.astype(of.dtype)
-
-
-def _bins(measurement: Measurement, positions: int, first: float) -> _Bins:
-    phase, torque = np.asarray(measurement.phase, float), np.asarray(measurement.torque, float)
-    torques, level = np.unique(torque, return_inverse=True)
-    place = ((phase - first) % 1) * positions
-    bins = level * positions + np.minimum(place.astype(int), positions - 1)
-    kept, row, readings = np.unique(bins, return_inverse=True, return_counts=True)
-    mean = first + np.bincount(row, place) / readings / positions
-    return _Bins(torques, kept // positions, mean, row, readings)
-
-
-def _noise(measurement: Measurement, bins: _Bins) -> Scalar:
-    if measurement.noise is not None:
-        return measurement.noise
-    value, free = measurement.transmission_error, len(bins.row) - len(bins.level)
-    if free < LEAST_ROWS:
-        raise ValueError(f"identify: noise = None needs {LEAST_ROWS} repeated readings or more, are {free}")
-    noise = jnp.sqrt(jnp.sum((value - bins.mean(value)[bins.row]) ** 2) / free)
-    known = concrete(noise)
-    if known is not None and not known > 0:
-        raise ValueError("identify: repeated readings are all alike, noise must be given [um]")
-    return noise
-
-
-def _joined(measurement: Measurement, mesh: Mesh) -> _Data:
-    """Readings of one torque within one position of the mesh, joined into their mean."""
-    bins = _bins(measurement, mesh.resolution.positions, float(np.asarray(mesh.phase)[0]))
-    dtype = mesh.slice_width.dtype
-    noise = _noise(measurement, bins).astype(dtype)
-    return _Data(
-        torques=jnp.asarray(bins.torques, dtype),
-        level=jnp.asarray(bins.level),
-        phase=jnp.asarray(bins.phase, dtype),
-        value=bins.mean(measurement.transmission_error).astype(dtype),
-        noise=noise / jnp.asarray(np.sqrt(bins.readings), dtype),
-    )
-
-
-def _found(problem: _Problem, data: _Data, fit: _Fit, candidates: Array, told_by_candidates: Array) -> Identified:
-    deviation = jnp.sqrt(jnp.diagonal(fit.covariance))
+def _found(problem: _Problem, data: Data, fit: _Fit, candidates: Array, told_by_candidates: Array) -> Identified:
+    turn = problem.turn
+    covariance = turn @ fit.covariance @ turn.T
+    deviation = jnp.sqrt(jnp.diagonal(covariance))
     told = jnp.sum(fit.singular**2 / (1 + fit.singular**2))
     weighted = jnp.sum(((data.value - fit.values) / data.noise) ** 2)
     return Identified(
         names=problem.names,
-        estimate=problem.mean + problem.spread * fit.z,
+        own=problem.own,
+        estimate=problem.mean + problem.spread * (turn @ fit.z),
         deviation=problem.spread * deviation,
-        correlation=fit.covariance / (deviation[:, None] * deviation[None, :]),
-        prior=jnp.stack([problem.mean, problem.spread]),
+        correlation=covariance / (deviation[:, None] * deviation[None, :]),
+        prior=jnp.stack([problem.mean, problem.spread * jnp.linalg.norm(turn, axis=1)]),
         singular_values=fit.singular,
-        directions=fit.directions,
+        directions=fit.directions @ turn.T,
         torque=data.torques[data.level],
         phase=data.phase,
         measured=data.value,

@@ -8,14 +8,16 @@ from typing import Any, Literal
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float, Int
 
 from ..conditions.join import side_by_side
-from ..contact import Kinematics, Mesh, MeshCycle, solve_removed
+from ..contact import Kinematics, Mesh, MeshCycle, Resolution, solve_removed
 from ..contact.face_coupling import check_torque
 from ..contact.operating_point import OperatingPoint, Torque, operating_point_of
+from ..contact.slide import RemovedMaterial
 from ..contact.solve import check_mesh, flanks_of, material_of, outermost, wider_mesh
-from ..contact.status import Status, WithStatus, status_of
+from ..contact.status import Status, Statuses, WithStatus, status_of
 from ..geometry import Gear, Margins
 from ..microgeometry import AbstractModification, terms
 from ..numerics import kernel, program
@@ -203,22 +205,32 @@ def _contacts(
 
     @partial(jax.checkpoint, prevent_cse=False)
     def cycle(window: Int[Array, ""]) -> dict[str, Array]:
-        # with the pairs before and behind those of the window
-        numbers = window - sizes.leading + jnp.arange(-1, sizes.chosen_pairs + 1)
+        numbers = window + pairs_in_window(sizes)
         pitch = _displacement(mesh, deviations, counts, numbers)
         removed = design
         if removed is None:
             own = _own(mesh, deviations, counts, numbers[1:-1])
             removed = material_of(mesh, at.torque, *flanks, own)
-        removed = removed + pitch[1:-1, None, None]
-        found = solve_removed(mesh, at, removed)
-        return {**{name: getattr(found, name) for name in _CONTACT}, "status": _status(mesh, found, removed, pitch)}
+        found, status = displaced(mesh, at, removed, pitch)
+        return {**{name: getattr(found, name) for name in _CONTACT}, "status": status}
 
     batches = -(-windows // side_by_side(mesh))
     size = -(-windows // batches)
     # whole batches only: a rest would be a program of its own, which takes as long to compile
     found = jax.lax.map(cycle, jnp.arange(batches * size), batch_size=size)
     return jax.tree.map(lambda part: part[:windows], found)
+
+
+def pairs_in_window(sizes: Resolution) -> Int[np.ndarray, " pairs"]:
+    """Numbers of the pairs of teeth of window 0, with those before and behind them."""
+    return np.arange(-1, sizes.chosen_pairs + 1) - sizes.leading
+
+
+def displaced(mesh: Mesh, at: Torque, removed: RemovedMaterial, pitch: Array) -> tuple[MeshCycle, Statuses]:
+    """Cycle and status of a window whose pairs are apart by their pitch deviations [um], those of `pairs_in_window`."""
+    removed = removed + pitch[1:-1, None, None]
+    found = solve_removed(mesh, at, removed)
+    return found, _status(mesh, found, removed, pitch)
 
 
 def _displacement(mesh: Mesh, deviations: Deviations, counts: tuple[int, int], numbers: Array) -> Float[Array, " n"]:

@@ -17,7 +17,7 @@ from ..io.errors import naming, problem, refused
 from ..io.tolerance_table import quality_classes
 from ..microgeometry import AbstractModification, EndRelief, LeadCrowning, LeadSlope
 from ..numerics import check, real
-from ..optimize import Identified, Measurement, identify
+from ..optimize import Identified, Measurement, identify, period_of
 from ..report import Table
 from ..tolerance import ToleranceClass
 from .checkpoints import Checkpoints
@@ -28,11 +28,18 @@ from .summary_data import flanks_data
 
 _OF_LIMIT = 3.0  # limit deviation over standard deviation: nearly all gears of a class keep its limits
 _OF_RANGE = 4.0  # range of a variable over standard deviation
+# refusals of data: how they begin, of which column they are, and what helps
+_HELP = (
+    ("offset", "te_um", ": --offset gives its standard deviation"),
+    ("phase", "phase", ": give the column revolution, or phases that go on"),
+    ("", "te_um", "; --noise gives it"),
+)
 _OVER_FACE = LeadCrowning, LeadSlope, EndRelief  # the helix tolerance is that of these, the profile's of all others
 _RELATED = 0.7  # least correlation that is said
 _REXS = "identified.rexs"
 _NOISE = "95 % of\nnoise [um]"
 _MOST_PANELS = 5
+_SHOWN = 4.0  # base pitches of a whole revolution
 _PANEL = 45.0  # height [mm]
 
 
@@ -54,6 +61,7 @@ class DesignIdentification(AbstractStudy["IdentificationResult"]):
         measurement: the data.
         prior: mean and standard deviation of every variable.
         torque_scale, offset: standard deviations of these unknowns; 0 where they are known.
+        single_pitch: those of the single pitch deviations of pinion and wheel; None for equal teeth.
     """
 
     name: ClassVar = "identify"
@@ -63,6 +71,7 @@ class DesignIdentification(AbstractStudy["IdentificationResult"]):
     prior: Mapping[str, tuple[float, float]]
     torque_scale: float
     offset: float
+    single_pitch: tuple[float, float] | None
 
     @classmethod
     def of(
@@ -74,6 +83,7 @@ class DesignIdentification(AbstractStudy["IdentificationResult"]):
         noise: float | None = None,
         torque_scale: float = 0.01,
         offset: float = 0.0,
+        pitch: bool = False,
     ) -> Self:
         """As `AbstractStudy.of`.
 
@@ -84,6 +94,7 @@ class DesignIdentification(AbstractStudy["IdentificationResult"]):
             noise: standard deviation of a reading [um]; None for that of repeats.
             torque_scale: standard deviation of true over measured torque; 0 for a right one.
             offset: standard deviation of what is added to every reading [um]; 0 for nothing.
+            pitch: whether single pitch deviations of all teeth are unknown, within f_pT of the class of their gear.
         """
         for name, given in (("torque-scale", torque_scale), ("offset", offset)):
             check("identify", name, given, "um" if name == "offset" else "", low=0.0)
@@ -100,14 +111,15 @@ class DesignIdentification(AbstractStudy["IdentificationResult"]):
                     f"variables.{name}", "is an unknown of identify, choose another name", design.path
                 )
         with naming(design.path):
-            prior = _prior(design)
+            prior, pitches = _prior(design), _single_pitch(design) if pitch else None
         data = read_measurement(measured, design.pair(), noise=noise)
-        study = cls(design, quick, Path(measured), data, prior, torque_scale, offset)
+        study = cls(design, quick, Path(measured), data, prior, torque_scale, offset, pitches)
         try:
-            data.noise_on(study._sizes())
+            data.noise_on(study._sizes(), period_of(data, design.pair(), pitches, offset or None))
         except ValueError as error:
             says = str(error).removeprefix("identify: ")
-            raise DesignFileError("te_um", f"{says}; --noise gives it", study.measured) from None
+            key, help_ = next((key, help_) for begin, key, help_ in _HELP if says.startswith(begin))
+            raise DesignFileError(key, says + help_, study.measured) from None
         return study
 
     def _further(self) -> list[float]:
@@ -135,11 +147,21 @@ class DesignIdentification(AbstractStudy["IdentificationResult"]):
                 mesh=mesh,
                 torque_scale=self.torque_scale or None,
                 offset=self.offset or None,
+                single_pitch=self.single_pitch,
                 candidates=self._further(),
             )
         except ValueError as error:
             raise DesignFileError("variables", str(error).removeprefix("identify: "), self.design.path) from None
         return IdentificationResult(self.design, self.measured, mesh, self.prior, found)
+
+
+def _single_pitch(design: DesignFile) -> tuple[float, float]:
+    """Standard deviations of the single pitch deviations of both gears: a third of f_pT of ISO 1328-1."""
+    classes = quality_classes(design)
+    if classes is None:
+        raise DesignFileError("tolerance", "missing; --pitch takes the limit f_pT of the class of each gear")
+    first, second = (float(of.single_pitch) / _OF_LIMIT for of in classes)
+    return first, second
 
 
 def _prior(design: DesignFile) -> dict[str, tuple[float, float]]:
@@ -193,7 +215,7 @@ class IdentificationResult(AbstractStudyResult):
     def _rows(self) -> Iterator[tuple[str, str, float, float, float, float]]:
         found, units = self.found, {**self.design.units, "torque_scale": "", "offset": "um"}
         numbers = (np.asarray(each).tolist() for each in (found.estimate, found.deviation, *found.prior))
-        for name, *values in zip(found.names, *numbers):
+        for name, *values in zip(found.names[: found.own], *numbers):
             yield name, units[name], *values
 
     def tables(self) -> list[Table]:
@@ -207,7 +229,23 @@ class IdentificationResult(AbstractStudyResult):
         left = Table(columns, title="measured minus fitted: amplitudes of the mesh orders")
         for torque, *row in zip(self.found.torques, *amplitudes.T, self.found.noise_orders):
             left.add_row(f"{torque:g}", *(f"{value:.3f}" for value in row))
-        return [result, left]
+        return [result, *self._pitches(), left]
+
+    def _pitches(self) -> Iterator[Table]:
+        """The pitch deviations of every gear in few numbers."""
+        if self.found.single_pitch:
+            header = (
+                "gear",
+                "largest single\npitch deviation",
+                "total cumulative\npitch deviation",
+                "standard deviation\nof a single one",
+            )
+            result = Table(header, title="pitch deviations [um]")
+            for gear, (single, deviation) in self.found.single_pitch.items():
+                one = np.asarray(single)
+                numbers = np.max(np.abs(one)), np.ptp(np.cumsum(one)), np.sqrt(np.mean(np.square(deviation)))
+                result.add_row(gear, *(f"{number:.3g}" for number in numbers))
+            yield result
 
     def verdict(self) -> Iterator[str]:
         """Quality of the fit, related unknowns, what the data cannot tell, and the torque that would tell most."""
@@ -217,7 +255,7 @@ class IdentificationResult(AbstractStudyResult):
             f"error of the model {float(found.model_error):.2g} um"
         )
         correlation = np.asarray(found.correlation)
-        for first, second in zip(*np.triu_indices(len(found.names), 1)):
+        for first, second in zip(*np.triu_indices(found.own, 1)):
             if abs(correlation[first, second]) >= _RELATED:
                 names = f"{found.names[first]} and {found.names[second]}"
                 yield f"correlation of {names}: {correlation[first, second]:.2f}"
@@ -237,7 +275,7 @@ class IdentificationResult(AbstractStudyResult):
     def failures(self) -> Iterator[str]:
         """A line where the search did not end, or its estimates make no flank."""
         if not bool(self.found.converged):
-            yield "NOT CONVERGED: do not use the estimates. Narrow the ranges or raise resolution.newton_steps."
+            yield "NOT CONVERGED: do not use the estimates. Narrow the ranges or raise resolution.pairs."
         try:
             self._flanks()
         except ValueError as error:
@@ -255,12 +293,16 @@ class IdentificationResult(AbstractStudyResult):
             "measured_file": self.measured.name,
             "torques_Nm": found.torques,
             "unknowns": {name: dict(zip(keys, row)) for name, *row in self._rows()},
-            "correlation": np.asarray(found.correlation),
+            "correlation": np.asarray(found.correlation)[: found.own, : found.own],
             "singular_values": np.asarray(found.singular_values),
             "cannot_tell": found.not_told(),
             "further_torque_Nm": found.best_candidate,
             "chi_square": float(found.chi_square),
             "model_error_um": float(found.model_error),
+            **{
+                f"{gear}_single_pitch_um": {"estimate": single, "standard_deviation": deviation}
+                for gear, (single, deviation) in found.single_pitch.items()
+            },
             "residual_orders_um": found.residual_orders,
             "noise_orders_um": found.noise_orders,
             "converged": bool(found.converged),
@@ -292,12 +334,18 @@ class IdentificationResult(AbstractStudyResult):
         return {"prior": self.design.design(before), "identified": self._flanks()}
 
     def write(self, folder: Path) -> None:
-        """The unknowns, `identified.csv`, and the pair with the estimates as design file, flanks and REXS file."""
+        """The unknowns as CSV, and the pair with the estimates as design file, flanks and REXS file."""
         with (folder / "identified.csv").open("w", newline="", encoding="utf-8") as file:
             writer = csv.writer(file)
             names = "name", "unit", "estimate", "standard_deviation", "prior_mean", "prior_standard_deviation"
             writer.writerow(names)
             writer.writerows([name, unit, *(f"{value:.7g}" for value in row)] for name, unit, *row in self._rows())
+        for gear, columns in self.found.single_pitch.items():
+            with (folder / f"pitch_{gear}.csv").open("w", newline="", encoding="utf-8") as file:
+                writer = csv.writer(file)
+                writer.writerow(["tooth", "single_pitch_um", "standard_deviation_um"])
+                rows = zip(*(np.asarray(column).tolist() for column in columns))
+                writer.writerows([tooth, *(f"{value:.4f}" for value in row)] for tooth, row in enumerate(rows))
         if list(self.failures()):
             return
         write_design(folder / "identified.toml", **self._pair())
@@ -314,20 +362,36 @@ class IdentificationResult(AbstractStudyResult):
             axes["k_chart"] = plot.k_chart(self.mesh, self._designs(), **of)
             if self.mesh.resolution.slices > 1:
                 axes["lead_chart"] = plot.lead_chart(self.mesh, self._designs(), **of)
+        if self.found.single_pitch:
+            axes["pitch"] = self._teeth()
         for drawn in axes.values():
             plot.emphasize(np.ravel(drawn)[0].figure, "identified")
         return axes
+
+    def _teeth(self) -> np.ndarray:
+        """Single pitch deviations with their standard deviations, a panel per gear."""
+        from .. import plot
+
+        pitches, style = self.found.single_pitch, {**plot.figure.line_style(0), "linestyle": "none"}
+        with plot.figure.report_axes(None, rows=len(pitches), height=_PANEL * len(pitches)) as panels:
+            for panel, (gear, (single, deviation)) in zip(np.ravel(panels), pitches.items()):
+                tooth = np.arange(len(single))
+                panel.bar(tooth, single, color="0.8")
+                panel.errorbar(tooth, single, deviation, markersize=3, marker="o", **style)
+                panel.set(ylabel=f"{gear}: single pitch\ndeviation [µm]")
+            panel.set_xlabel("tooth")
+        return panels
 
     def _fit(self) -> np.ndarray:
         """Measured and fitted transmission error over the phase, a panel per torque."""
         from .. import plot
 
-        found, torques = self.found, self.found.torques
+        found, torques, first = self.found, self.found.torques, np.min(np.asarray(self.found.phase))
         shown = torques[np.unique(np.linspace(0, len(torques) - 1, _MOST_PANELS).round().astype(int))]
         size: dict[str, Any] = {"rows": len(shown), "height": _PANEL * len(shown)}
         with plot.figure.report_axes(None, **size) as panels:
             for number, (panel, torque) in enumerate(zip(np.ravel(panels), shown)):
-                at = np.flatnonzero(np.asarray(found.torque) == torque)
+                at = np.flatnonzero((np.asarray(found.torque) == torque) & (np.asarray(found.phase) < first + _SHOWN))
                 at = at[np.argsort(np.asarray(found.phase)[at])]
                 phase, measured, fitted, noise = (
                     np.asarray(each)[at] for each in (found.phase, found.measured, found.fitted, found.noise)

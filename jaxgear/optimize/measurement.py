@@ -1,0 +1,237 @@
+"""A measured transmission error: its readings joined, their noise, and the error of a model that is fitted to them."""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from ..contact import Mesh, Resolution
+from ..numerics import Checked, concrete, number, pivots, solve_dense
+
+Scalar = Float[Array, ""]
+Rows = Float[Array, " rows"]
+
+LEAST_ROWS = 12  # of a measurement
+ORDERS = 8  # mesh orders of the error of the model
+_LARGEST_GAP = 0.25  # between neighbouring phases of one torque [base pitches]: the first three mesh orders are seen
+
+
+class Measurement(Checked):
+    """A measured transmission error, a row per reading.
+
+    Attributes:
+        phase: mesh position, in which teeth 0 of both gears touch at the pitch point at 0; readings of several base
+            pitches are folded into one, but where teeth differ.
+        torque: on the pinion.
+        transmission_error: along the line of action, positive when the wheel lags.
+        noise: standard deviation of a reading; None for that of repeats, of readings of one torque within one mesh
+            position.
+
+    Raises:
+        ValueError: for less than 12 readings, columns of different lengths, numbers that are not finite, or phases
+            of a torque that leave more than a quarter of the base pitch out.
+    """
+
+    phase: Rows = number("base pitches", shape=("rows",))
+    torque: Rows = number("N m", low=0.0, open_low=True, shape=("rows",))
+    transmission_error: Rows = number("um", shape=("rows",))
+    noise: Scalar | None = number("um", low=0.0, open_low=True, optional=True, default=None)
+
+    def __check_init__(self) -> None:
+        counts = {name: len(getattr(self, name)) for name in ("phase", "torque", "transmission_error")}
+        if min(counts.values()) < LEAST_ROWS:
+            raise ValueError(f"Measurement: phase has {counts['phase']} rows, must have {LEAST_ROWS} at least")
+        if len(set(counts.values())) > 1:
+            raise ValueError(f"Measurement: torque has {counts['torque']} rows, phase {counts['phase']}")
+        phase, torque = np.asarray(self.phase) % 1, np.asarray(self.torque)
+        for level in np.unique(torque):
+            places = np.sort(phase[torque == level])
+            gap = float(np.diff(places, append=places[0] + 1).max())
+            if gap > _LARGEST_GAP:
+                raise ValueError(
+                    f"Measurement: phase does not cover a base pitch at {level:g} N m: {gap:.2g} of it are without a "
+                    f"reading, must be {_LARGEST_GAP:g} at most"
+                )
+
+    def noise_on(self, resolution: Resolution, period: int = 1) -> Scalar:
+        """Standard deviation of a reading [um], given or of readings of one torque within one position of the mesh.
+
+        Args:
+            resolution: of the mesh.
+            period: base pitches after which the same teeth meet; 1 for equal teeth.
+
+        Raises:
+            ValueError: for none that is given and too few repeats, or repeats that are all alike.
+        """
+        return noise_of(self, bins_of(self, resolution.positions, float(np.asarray(resolution.first_phase)), period))
+
+
+class Bins(NamedTuple):
+    """Readings by torque and position of the mesh.
+
+    Attributes:
+        torques: ascending, shape (torques,).
+        level: number of the torque of every bin that has readings.
+        place: mean mesh position of its readings, in positions of the mesh from the first.
+        row: bin of every reading.
+        readings: of every bin, their number.
+    """
+
+    torques: np.ndarray
+    level: np.ndarray
+    place: np.ndarray
+    row: np.ndarray
+    readings: np.ndarray
+
+    def mean(self, of: Array) -> Array:
+        """Of the readings of every bin."""
+        return jnp.zeros(len(self.level), of.dtype).at[self.row].add(of) / self.readings.astype(of.dtype)
+
+
+def bins_of(measurement: Measurement, positions: int, first: float, period: int = 1) -> Bins:
+    """Readings joined; those as many base pitches apart as the period count as one position."""
+    phase, torque = np.asarray(measurement.phase, float), np.asarray(measurement.torque, float)
+    torques, level = np.unique(torque, return_inverse=True)
+    count = period * positions
+    # around the positions of the mesh: readings at these are not split by rounding
+    place = (((phase - first) * positions + 0.5) % count) - 0.5
+    bins = level * count + np.minimum((place + 0.5).astype(int), count - 1)
+    kept, row, readings = np.unique(bins, return_inverse=True, return_counts=True)
+    return Bins(torques, kept // count, np.bincount(row, place) / readings, row, readings)
+
+
+def noise_of(measurement: Measurement, bins: Bins) -> Scalar:
+    """As `Measurement.noise_on`."""
+    if measurement.noise is not None:
+        return measurement.noise
+    value, free = measurement.transmission_error, len(bins.row) - len(bins.level)
+    if free < LEAST_ROWS:
+        raise ValueError(f"identify: noise = None needs {LEAST_ROWS} repeated readings or more, are {free}")
+    noise = jnp.sqrt(jnp.sum((value - bins.mean(value)[bins.row]) ** 2) / free)
+    known = concrete(noise)
+    if known is not None and not known > 0:
+        raise ValueError("identify: repeated readings are all alike, noise must be given [um]")
+    return noise
+
+
+class Data(eqx.Module):
+    """Readings joined per torque and position of the mesh: what a compiled fit takes.
+
+    Attributes:
+        torques: ascending.
+        level: number of the torque of every row.
+        before, after: places of the windows between which a row lies.
+        share: how far it is from the first to the second.
+        phase, value, noise: of the row.
+    """
+
+    torques: Float[Array, " torques"]
+    level: Array
+    before: Array
+    after: Array
+    share: Rows
+    phase: Rows
+    value: Rows
+    noise: Rows
+
+    def at(self, of: Float[Array, "torques places *columns"]) -> Float[Array, "rows *columns"]:
+        """At the readings, between positions of the mesh by a straight line."""
+        first, second = of[self.level, self.before], of[self.level, self.after]
+        return first + self.share.reshape(-1, *[1] * (first.ndim - 1)) * (second - first)
+
+
+def joined(measurement: Measurement, mesh: Mesh, period: int) -> tuple[Data, np.ndarray]:
+    """Means of the readings of one torque within one position of the mesh, and the windows that they need."""
+    positions, first = mesh.resolution.positions, float(np.asarray(mesh.phase)[0])
+    bins = bins_of(measurement, positions, first, period)
+    before = np.floor(bins.place).astype(int)
+    places = np.stack([before, before + 1]) % (period * positions)
+    windows, number = np.unique(places // positions, return_inverse=True)
+    places = number.reshape(places.shape) * positions + places % positions
+    dtype = mesh.slice_width.dtype
+    noise = noise_of(measurement, bins).astype(dtype)
+    data = Data(
+        torques=jnp.asarray(bins.torques, dtype),
+        level=jnp.asarray(bins.level),
+        before=jnp.asarray(places[0]),
+        after=jnp.asarray(places[1]),
+        share=jnp.asarray(bins.place - before, dtype),
+        phase=jnp.asarray(first + bins.place / positions, dtype),
+        value=bins.mean(measurement.transmission_error).astype(dtype),
+        noise=noise / jnp.asarray(np.sqrt(bins.readings), dtype),
+    )
+    return data, windows
+
+
+def _error_shapes(data: Data) -> Float[Array, "rows shapes"]:
+    """Curves of unit size that a stiffness in error adds: alike at all torques, and each torque its own.
+
+    Proportional to the torque; the amplitude of a mesh order falls with its number.
+    """
+    order = jnp.arange(1, ORDERS + 1, dtype=data.phase.dtype)
+    angle = 2 * jnp.pi * data.phase[:, None] * order[None]
+    waves = jnp.concatenate([jnp.cos(angle) / order[None], jnp.sin(angle) / order[None]], axis=1)
+    load = (data.torques / jnp.max(data.torques))[data.level]
+    alike = load[:, None] * jnp.concatenate([jnp.ones_like(waves[:, :1]), waves], axis=1)
+    own = jax.nn.one_hot(data.level, data.torques.shape[0], dtype=alike.dtype)
+    return jnp.concatenate([alike, (own[:, :, None] * alike[:, None, :]).reshape(alike.shape[0], -1)], axis=1)
+
+
+class Errors(NamedTuple):
+    """Noise and error of the model, as independent shapes and what is outside of them.
+
+    Attributes:
+        noise: of the readings.
+        shapes: of readings in noises, orthonormal columns.
+        variance: of the error of the model in every one, where its shapes have unit size.
+    """
+
+    noise: Rows
+    shapes: Float[Array, "rows shapes"]
+    variance: Float[Array, " shapes"]
+
+    def split(self, of: Float[Array, "rows columns"]) -> tuple[Array, Array]:
+        """Columns of readings, in noises: outside of the shapes, and along them."""
+        of = of / self.noise[:, None]
+        along = self.shapes.T @ of
+        return of - self.shapes @ along, along
+
+    def whitened(self, size: Scalar, of: Float[Array, "rows columns"]) -> Float[Array, "sums columns"]:
+        """As independent sums of readings in standard deviations."""
+        outside, along = self.split(of)
+        return jnp.concatenate([outside, along / self._deviation(size)])
+
+    def products(self, of: Float[Array, "rows columns"]) -> Callable[[Scalar], Float[Array, "columns columns"]]:
+        """Of all columns of `whitened` with each other, by the size of the error of the model."""
+        outside, along = self.split(of)
+        square = outside.T @ outside
+
+        def at(size: Scalar) -> Array:
+            inside = along / self._deviation(size)
+            return square + inside.T @ inside
+
+        return at
+
+    def _deviation(self, size: Scalar) -> Array:
+        return jnp.sqrt(1 + size**2 * self.variance)[:, None]
+
+    def evidence(self, size: Scalar, product: Array, z: Array) -> Scalar:
+        """Logarithm of the probability of the data under an error of this size, the unknowns integrated.
+
+        Of the products of the slopes at z and of what is left there; where that is more than the unknowns.
+        """
+        count = len(z)
+        square, b, left = product[:count, :count], product[:count, count], product[count, count]
+        left, b = left + 2 * z @ b + z @ square @ z, b + square @ z  # from there to the prior means
+        normal = square + jnp.eye(count, dtype=z.dtype)
+        determinant = jnp.sum(jnp.log1p(size**2 * self.variance)) + jnp.sum(jnp.log(pivots(normal)))
+        return -0.5 * (left - b @ solve_dense(normal, b) + determinant)
+
+
+def errors_of(data: Data) -> Errors:
+    shapes, size, _ = jnp.linalg.svd(_error_shapes(data) / data.noise[:, None], full_matrices=False)
+    return Errors(data.noise, shapes, size**2)
