@@ -29,8 +29,8 @@ def written(folder, base=BASE):
     """A design file with a relief that is unknown, and readings that are good but for their values."""
     path, data = folder / "pair.toml", folder / "te.csv"
     path.write_text(base, encoding="utf-8")
-    rows = [f"{phase / 16},{torque},{phase % 3}" for torque in TORQUES for phase in range(16)]
-    data.write_text("\n".join(["phase,torque_Nm,te_um", *rows]), encoding="utf-8")
+    rows = [f"{phase / 16},{torque},{phase % 3},{1 + phase % 2}" for torque in TORQUES for phase in range(16)]
+    data.write_text("\n".join(["phase,torque_Nm,te_um,revolution", *rows]), encoding="utf-8")
     return path, data
 
 
@@ -59,15 +59,18 @@ class Search:
     def __call__(self, design, prior, measurement, **asked):
         self.asked = asked
         left = 0.3 * np.cos(4 * np.pi * measurement.phase)  # the second mesh order
-        names, count = (*prior, "torque_scale"), len(prior) + 1
+        own = len(prior) + 1
+        pitches = [f"{gear}_pitch_{tooth}" for gear, teeth in (("pinion", 19), ("wheel", 48)) for tooth in range(teeth)]
+        names = (*prior, "torque_scale", *(pitches if asked["single_pitch"] else ()))
+        count = len(names)
         return Identified(
             names=names,
-            own=count,
-            estimate=jnp.full(count, self.height),
+            own=own,
+            estimate=jnp.where(jnp.arange(count) < own, self.height, jnp.arange(count) - own),
             deviation=jnp.full(count, 0.5),
             correlation=0.8 + 0.2 * jnp.eye(count),
             prior=jnp.ones((2, count)),
-            singular_values=jnp.geomspace(10.0, 0.1, count),
+            singular_values=jnp.where(jnp.arange(count) < own - 1, 10.0, 0.1),
             directions=jnp.eye(count),
             torque=measurement.torque,
             phase=measurement.phase,
@@ -90,7 +93,9 @@ def ran(tmp_path_factory):
     with pytest.MonkeyPatch.context() as monkeypatch:
         search = Search(monkeypatch, 8.0)
         monkeypatch.setenv("JAXGEAR_NO_CACHE", "1")
-        result = call("identify", path, data, "--noise", 0.05, "--offset", 2, "--quick", "-o", folder / "out")
+        result = call(
+            "identify", path, data, "--noise", 0.05, "--offset", 2, "--pitch", "--quick", "-o", folder / "out"
+        )
     assert result.code == 0, result.err
     summary = json.loads((folder / "out" / "summary.json").read_text(encoding="utf-8"))
     return result, folder / "out", summary, search
@@ -98,7 +103,7 @@ def ran(tmp_path_factory):
 
 def test_its_files(ran):
     _, folder, summary, _ = ran
-    names = {
+    names = {"pitch.png", "pitch_pinion.csv", "pitch_wheel.csv"} | {
         "summary.json",
         "flanks.csv",
         "k_chart.png",
@@ -122,12 +127,29 @@ def test_the_flanks_it_writes_are_those_of_the_estimates(ran):
     assert largest[("identified", "wheel")] == 8.0 and largest[("prior", "wheel")] == 6.0
 
 
+def test_pitch_deviations_are_those_of_the_teeth_of_a_design_file(ran, tmp_path):
+    _, folder, summary, search = ran
+    design = load_design(folder / "identified.toml")
+    expected = [
+        float(ToleranceClass.of(gear, number).single_pitch) / 3 for gear, number in zip(design.pair().gears, (5, 7))
+    ]
+    assert search.asked["single_pitch"] == pytest.approx(expected)
+    for gear, first, count in (("pinion", 0, 19), ("wheel", 19, 48)):
+        with (folder / f"pitch_{gear}.csv").open(encoding="utf-8") as file:
+            rows = list(csv.DictReader(file))
+        assert [int(row["tooth"]) for row in rows] == list(range(count))
+        assert [float(row["single_pitch_um"]) for row in rows] == list(range(first, first + count))
+        assert summary[f"{gear}_single_pitch_um"]["estimate"] == [float(row["single_pitch_um"]) for row in rows]
+    assert set(summary["unknowns"]) == {"height", "depth", "torque_scale"}
+
+
 def test_what_it_says(ran):
     result, _, summary, _ = ran
     assert "correlation of height and torque_scale: 0.80" in result.out
     assert "least: 50 N m" in result.out and "quick run, coarse positions" in result.out
-    (line,) = summary["cannot_tell"]
-    assert line.startswith("torque_scale cannot be told: ") and line in result.out
+    first, second = summary["cannot_tell"]
+    assert first.startswith("torque_scale cannot be told: ") and first in result.out
+    assert second.startswith("67 combinations of 67 pitch deviations cannot be told")
 
 
 def test_what_the_fit_leaves_is_given_by_mesh_orders(ran):
@@ -189,6 +211,14 @@ def test_interrupted_it_leaves_nothing(tmp_path, monkeypatch):
         (BASE, ("", ""), ["--noise", 0.1, "--offset", -1], ["offset = -1 um must be at least 0 um"]),
         (BASE, ("", ""), [], ["te.csv: te_um: noise = None needs 12 repeated readings", "--noise gives it"]),
         (FIXED, ("", ""), ["--noise", 0.1], ["pair.toml", "variables: missing"]),
+        (BASE, ("", ""), ["--noise", 0.1, "--pitch"], ["pair.toml", "tolerance: missing; --pitch takes"]),
+        (BASE + CLASSES, ("", ""), ["--noise", 0.1, "--pitch"], ["te.csv: te_um: offset", "--offset gives"]),
+        (
+            BASE + CLASSES,
+            ("revolution", "repeat"),
+            ["--pitch", "--offset", 5, "--noise", 0.1],
+            ["te.csv: phase: covers 0.94"],
+        ),
     ],
 )
 def test_what_is_refused_leaves_nothing(tmp_path, base, change, options, fragments):

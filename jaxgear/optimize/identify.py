@@ -38,6 +38,7 @@ _DAMPING = 100.0  # of the first step, which prior deviations measure
 _SETTLED = 0.05  # largest move at the end, in prior standard deviations
 _LAST = 1e-9  # move that ends the search
 _ROUND_OFF = 1e-9
+_SAME = 4  # decimals of phases that are one
 _EQUAL = None, None  # teeth of both gears
 _OF_NOISE = 2 * (-np.log(0.05)) ** 0.5  # 95 % of amplitudes by Rayleigh's law, over noise and root of the readings
 
@@ -94,8 +95,8 @@ class Identified(Checked):
 
     @property
     def parameters(self) -> dict[str, Scalar]:
-        """The estimates by name, which the design takes."""
-        return dict(zip(self.names, self.estimate))
+        """The estimates by name but for pitch deviations, which the design takes."""
+        return dict(zip(self.names, self.estimate[: self.own]))
 
     def not_told(self) -> list[str]:
         """What the data cannot tell, a line per combination: of it the prior says more than they do."""
@@ -139,7 +140,8 @@ class Identified(Checked):
         By least squares; as many orders as the readings of every torque resolve, 8 at most.
         """
         every, left = self._rows_of_torques(), np.asarray(self.measured - self.fitted)
-        orders = np.arange(1, max(1, min(ORDERS, (min(map(len, every)) - 1) // 2)) + 1)
+        places = min(len(np.unique(np.round(np.asarray(self.phase)[rows] % 1, _SAME))) for rows in every)
+        orders = np.arange(1, max(1, min(ORDERS, (places - 1) // 2)) + 1)
         found = []
         for rows in every:
             angle = 2 * np.pi * np.outer(np.asarray(self.phase)[rows], orders)
@@ -393,7 +395,7 @@ def _posed(
     deflection = jnp.mean(cycle.transmission_error - cycle.unloaded_transmission_error)
     differ = [_closed(count) for count, known in zip(counts, spreads) if known is not None]
     turn = scipy.linalg.block_diag(np.eye(own), *differ)
-    gaps = jnp.asarray(_gaps(mesh, windows, counts, spreads), spread.dtype)
+    gaps = _gaps(mesh, windows, counts, spreads)
     least = model_error * deflection / _BOTH
     return _Problem(design, tuple(every), own, mesh, mean, spread, jnp.asarray(turn, spread.dtype), gaps, least), data
 
@@ -422,16 +424,16 @@ def _closed(teeth: int) -> Float[np.ndarray, "teeth independent"]:
     return np.linalg.qr(np.eye(teeth) - 1 / teeth)[0][:, :-1]
 
 
-def _gaps(mesh: Mesh, windows: np.ndarray, counts: Sequence[int], spreads: Sequence[float | None]) -> np.ndarray:
+def _gaps(mesh: Mesh, windows: np.ndarray, counts: Sequence[int], spreads: Sequence[float | None]) -> Array:
     """As of `_Problem`: cumulative pitch deviations, around their mean, of both teeth of every pair."""
     numbers = windows[:, None] + pairs_in_window(mesh.resolution)
-    found = [np.zeros((*numbers.shape, 0))]
+    found = [jnp.zeros((*numbers.shape, 0), mesh.slice_width.dtype)]
     for gear, count, spread in zip(mesh.pair.gears, counts, spreads):
         if spread is not None:
             total = np.cumsum(_closed(count), axis=0)
-            along_line = spread * float(jnp.cos(gear.transverse_pressure_angle))
-            found.append(along_line * (total - total.mean(axis=0))[numbers % count])
-    return np.concatenate(found, axis=-1)
+            around = jnp.asarray(spread * (total - total.mean(axis=0)), found[0].dtype)
+            found.append(around[numbers % count] * jnp.cos(gear.transverse_pressure_angle).astype(around.dtype))
+    return jnp.concatenate(found, axis=-1)
 
 
 def _check_used(design: Design, prior: Prior, mesh: Mesh, torque: float) -> None:

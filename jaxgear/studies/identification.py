@@ -119,7 +119,7 @@ class DesignIdentification(AbstractStudy["IdentificationResult"]):
         except ValueError as error:
             says = str(error).removeprefix("identify: ")
             key, help_ = next((key, help_) for begin, key, help_ in _HELP if says.startswith(begin))
-            raise DesignFileError(key, says + help_, study.measured) from None
+            raise DesignFileError(key, says.removeprefix(f"{key} ") + help_, study.measured) from None
         return study
 
     def _further(self) -> list[float]:
@@ -374,7 +374,8 @@ class IdentificationResult(AbstractStudyResult):
 
         pitches, style = self.found.single_pitch, {**plot.figure.line_style(0), "linestyle": "none"}
         with plot.figure.report_axes(None, rows=len(pitches), height=_PANEL * len(pitches)) as panels:
-            for panel, (gear, (single, deviation)) in zip(np.ravel(panels), pitches.items()):
+            for panel, (gear, given) in zip(np.ravel(panels), pitches.items()):
+                single, deviation = map(np.asarray, given)
                 tooth = np.arange(len(single))
                 panel.bar(tooth, single, color="0.8")
                 panel.errorbar(tooth, single, deviation, markersize=3, marker="o", **style)
