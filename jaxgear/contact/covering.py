@@ -22,10 +22,35 @@ _PER_PITCH, _FEWEST_SLICES = 10, 11
 
 def pairs_for(pair: GearPair, deflection: float | None) -> int:
     """Pairs to carry along where a resolution leaves their number open, see `prepare`."""
-    module = concrete(pair.pinion.module)
-    if module is None or any(concrete(leaf) is None for leaf in jax.tree.leaves(pair)):
+    if any(concrete(leaf) is None for leaf in jax.tree.leaves(pair)):
         return _PAIRS_TRACED
-    return fewest_pairs(pair, deflection=_DEFLECTION * float(module) if deflection is None else deflection)
+    return fewest_pairs(pair, deflection=_contained(pair, deflection))
+
+
+def _contained(pair: GearPair, deflection: float | None) -> float:
+    """Deflection that the pairs have to contain [um]."""
+    return _DEFLECTION * float(pair.pinion.module) if deflection is None else deflection
+
+
+def pairs_alternate(pair: GearPair, resolution: Resolution, deflection: float | None) -> bool:
+    """Whether at most one of the even and one of the odd pairs can touch in any one slice of helical gears.
+
+    Those are the two pairs within a base pitch of the pitch point, as of a spur pair. Whoever carries along more pairs
+    than the deflection needs gets all of them.
+    """
+    if pair.is_spur or not resolution.is_coupled or any(concrete(leaf) is None for leaf in jax.tree.leaves(pair)):
+        return False
+    wanted = _contained(pair, deflection)
+    if not 2 < resolution.chosen_pairs <= fewest_pairs(pair, deflection=wanted):
+        return False
+    return bool(np.min(np.asarray(_gaps_of_slices(pair))) > wanted)
+
+
+@program
+def _gaps_of_slices(pair: GearPair) -> Array:
+    """Transmission error at which a third pair touches in a slice, behind and ahead of the two next to the middle."""
+    contact = path_of_contact(pair)
+    return closing(contacts(pair, contact, jnp.stack([-contact.base_pitch, contact.base_pitch])))
 
 
 def fewest_pairs(pair: GearPair, *, deflection: float = 100.0) -> int:

@@ -17,7 +17,7 @@ from ..geometry import GearPair, Margins, Outline, PathOfContact, explicit, marg
 from ..microgeometry import Flank
 from ..numerics import AbstractSpring, Given, SliceCoupling, changed, on_both, over_slices, program
 from ..numerics.programs import begin
-from .covering import check_cover, check_slices, closing, helical_slices, pairs_for
+from .covering import check_cover, check_slices, closing, helical_slices, pairs_alternate, pairs_for
 from .face_coupling import check_modes, check_support, coupling_of, ends_together, slices_alike, spreading_of
 from .kinematics import Kinematics, Side, contacts, kinematics, sides
 from .resolution import Resolution
@@ -93,6 +93,9 @@ class Mesh(eqx.Module):
         automatic: whether the number of pairs was left to `prepare`: `solve` takes more where they are too few.
         even: whether neither gear is known to help beyond the common face: both end together, or the model is one of
             two dimensions.
+        alternates: whether at most one of the even and one of the odd pairs can touch in any slice, see
+            `pairs_alternate`: slices of helical gears then have two springs each, however many pairs touch over the
+            face.
     """
 
     kinematics: Kinematics
@@ -116,6 +119,7 @@ class Mesh(eqx.Module):
     support_status: Statuses | None = None
     automatic: bool = eqx.field(static=True, default=False)
     even: bool = eqx.field(static=True, default=False)
+    alternates: bool = eqx.field(static=True, default=False)
 
     def __repr__(self) -> str:
         return f"Mesh(pair={self.pair!r}, resolution={self.resolution!r})"
@@ -235,7 +239,7 @@ def prepare(
     mesh = prepare_from(first, pair, compliance, resolution, support, ends_together(pair, compliance))
     check_cover(mesh.pair, mesh.path_of_contact, resolution)
     check_modes(support, resolution)
-    return replace(mesh, automatic=True) if automatic else mesh
+    return replace(mesh, automatic=automatic, alternates=pairs_alternate(explicit(pair), resolution, deflection))
 
 
 def prepare_from(
@@ -359,7 +363,7 @@ def resized(mesh: Mesh, **sizes: Unpack[Sizes]) -> Mesh:
     if wanted == mesh.resolution:
         return mesh
     made = prepare_from(mesh.kinematics.first_phase, mesh.pair, mesh.compliance, wanted, mesh.support, mesh.even)
-    return replace(made, automatic=mesh.automatic)
+    return replace(made, automatic=mesh.automatic, alternates=mesh.alternates and "pairs" not in sizes)
 
 
 def half_way(mesh: Mesh) -> Mesh:
@@ -371,7 +375,7 @@ def later(mesh: Mesh, share: float) -> Mesh:
     """The same mesh a share of a position later."""
     first = np.asarray(mesh.kinematics.first_phase) + share / mesh.resolution.positions
     moved = prepare_from(first, mesh.pair, mesh.compliance, mesh.resolution, mesh.support, mesh.even)
-    return replace(moved, automatic=mesh.automatic)
+    return replace(moved, automatic=mesh.automatic, alternates=mesh.alternates)
 
 
 def parts(mesh: Mesh, positions: int) -> list[Mesh]:

@@ -6,7 +6,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..microgeometry import AbstractModification
-from ..numerics import Checked, Numbers, check, over_slices, program, real, result, tangent_stiffness
+from ..numerics import Checked, Numbers, check, over_slices, program, real, result
 from .face_coupling import check_torque
 from .mesh import Mesh
 from .operating_point import Torque, operating_point_of
@@ -108,7 +108,8 @@ def _solve_at(mesh: Mesh, approach: Curve, removed: RemovedMaterial, shared: Sca
     if shared is not None:
         structure = structure + shared * mesh.slice_width[0] * mesh.lever[:, None] * mesh.lever[None]
     gap = over_slices(mesh.corner_gap) + removed.amount
-    problem, solution = contact_of(mesh, gap, removed.shift, approach=approach, compliance=structure)
+    contact = contact_of(mesh, gap, removed.shift, approach=approach, compliance=structure)
+    solution = contact.solution
     pair_force = pair_forces(mesh, solution.line_load)
     force = jnp.sum(pair_force, axis=0)
     error = approach if shared is None else approach - shared * force
@@ -117,9 +118,9 @@ def _solve_at(mesh: Mesh, approach: Curve, removed: RemovedMaterial, shared: Sca
         force=force,
         pair_force=pair_force,
         line_load=solution.line_load,
-        tangent_stiffness=tangent_stiffness(problem, solution),
+        tangent_stiffness=contact.tangent_stiffness,
         residual=solution.residual,
-        status=contact_status(mesh, solution, error, removed),
+        status=contact_status(mesh, contact, error, removed),
     )
 
 
@@ -138,8 +139,9 @@ class ForcedContact(WithStatus, eqx.Module):
 @program
 def solve_forces(mesh: Mesh, force: Curve, removed: RemovedMaterial) -> ForcedContact:
     """Contact under a force on the line of action at every mesh position [N], at least zero, shape (positions,)."""
-    _, solution = contact_of(mesh, over_slices(mesh.corner_gap) + removed.amount, removed.shift, load=force)
-    return ForcedContact(solution.line_load, contact_status(mesh, solution, solution.approach, removed))
+    contact = contact_of(mesh, over_slices(mesh.corner_gap) + removed.amount, removed.shift, load=force)
+    status = contact_status(mesh, contact, contact.solution.approach, removed)
+    return ForcedContact(contact.solution.line_load, status)
 
 
 class SeriesContact(WithStatus, eqx.Module):

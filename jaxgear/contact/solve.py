@@ -2,13 +2,13 @@
 
 from dataclasses import replace
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Bool, Float
 
 from ..compliance import AbstractCompliance
 from ..geometry import GearPair, reduced_radius
@@ -19,6 +19,8 @@ from ..numerics import (
     Given,
     concrete,
     minimum,
+    nearest,
+    opening,
     over_slices,
     program,
     solve_contact,
@@ -232,9 +234,11 @@ def _cycle(mesh: Mesh, operating_point: OperatingPoint, contact: dict[str, Any],
 
 
 def wider_mesh(mesh: Mesh, status: Statuses) -> Mesh | None:
-    """The mesh at the same positions with more pairs, where their number was open, is too small and can be known."""
+    """The mesh at the same positions where more pairs can touch, if their number was open, is too small and known."""
     if not more_pairs_help(mesh, status):
         return None
+    if mesh.alternates:
+        return replace(mesh, alternates=False)
     return resized(mesh, pairs=mesh.resolution.chosen_pairs + 1)
 
 
@@ -244,10 +248,24 @@ def more_pairs_help(mesh: Mesh, status: Statuses) -> bool:
     return known is not None and bool((known == Status.MORE_PAIRS_NEEDED).any())
 
 
-def contact_of(
-    mesh: Mesh, gap: Load, shift: Float[Array, "pairs #slices positions"], **given: Any
-) -> tuple[ContactProblem, ContactSolution]:
-    """The contact problem of a mesh, and its solution.
+class Contact(NamedTuple):
+    """A contact problem and its solution.
+
+    Attributes:
+        gap: of the flanks with that of the support [um].
+        solution: of all pairs.
+        tangent_stiffness: of the teeth in contact [N/um].
+        contained: where no pair touches that was taken to be too far from the mate.
+    """
+
+    gap: Load
+    solution: ContactSolution
+    tangent_stiffness: Curve
+    contained: Bool[Array, " positions"]
+
+
+def contact_of(mesh: Mesh, gap: Load, shift: Float[Array, "pairs #slices positions"], **given: Any) -> Contact:
+    """The contact of a mesh.
 
     Args:
         mesh: prepared mesh.
@@ -265,7 +283,38 @@ def contact_of(
         weight=mesh.slice_width,
         coupling=mesh.coupling,
     )
-    return problem, _solved(mesh, problem)
+    if problem.load is None or not mesh.alternates:
+        solution = _solved(mesh, problem)
+        everywhere = jnp.ones(solution.approach.shape, bool)
+        return Contact(problem.gap, solution, tangent_stiffness(problem, solution), everywhere)
+    return _of_two_pairs(mesh, problem)
+
+
+def _of_two_pairs(mesh: Mesh, problem: ContactProblem) -> Contact:
+    """The contact where in every slice only the two pairs next to the middle of the path can touch."""
+    coupling = problem.coupling
+    assert coupling is not None  # `pairs_alternate` asks for it
+    two = nearest(jnp.abs(mesh.kinematics.contact_path))
+    rows = partial(jax.tree.map, two.rows)
+    near = replace(
+        problem,
+        law=rows(problem.law),
+        start_law=rows(problem.start_law),
+        gap=rows(problem.gap),
+        lever=rows(problem.lever),
+        coupling=replace(coupling, scale=rows(coupling.scale), alternation=two),
+    )
+    found = _solved(mesh, near)
+    load = two.springs(list(found.line_load))
+    left = jnp.stack(opening(problem, load, found.approach))
+    solution = replace(
+        found,
+        line_load=jnp.stack(load),
+        opening=left,
+        in_contact=jnp.stack(two.springs(list(found.in_contact))),
+    )
+    apart = jnp.min(jnp.where(two.chosen, 0.0, left), axis=(0, 1)) >= 0
+    return Contact(problem.gap, solution, tangent_stiffness(near, found), apart)
 
 
 def _solved(mesh: Mesh, problem: ContactProblem) -> ContactSolution:
@@ -297,21 +346,22 @@ def pair_forces(mesh: Mesh, line_load: Load) -> Float[Array, "pairs positions"]:
     return mesh.lever * jnp.sum(line_load * mesh.slice_width[None, :, None], axis=1)
 
 
-def contact_status(mesh: Mesh, solution: ContactSolution, error: Curve, removed: RemovedMaterial) -> Statuses:
+def contact_status(mesh: Mesh, contact: Contact, error: Curve, removed: RemovedMaterial) -> Statuses:
     """Status of the contact at every position, shape (positions,).
 
     Args:
         mesh: prepared mesh.
-        solution: of the contact problem.
+        contact: its contact.
         error: transmission error without the wind-up of the bodies [um].
         removed: material removed from the flanks.
     """
     # the deflection of the support closes no gap of pairs that are not carried along
+    solution = contact.solution
     teeth, last = error - mesh.support_deflection(solution.line_load), outermost(mesh, removed)
     # what is not a number has not converged
     causes = {
-        Status.NOT_CONVERGED: ~(solution.converged & (teeth < last)),
-        Status.MORE_PAIRS_NEEDED: teeth >= last,
+        Status.NOT_CONVERGED: ~(solution.converged & (teeth < last) & contact.contained),
+        Status.MORE_PAIRS_NEEDED: (teeth >= last) | ~contact.contained,
     }
     return status_of(causes, mesh.status)
 
@@ -348,11 +398,10 @@ def _solve_removed(mesh: Mesh, torque: Scalar, removed: RemovedMaterial) -> dict
     force = _force(mesh, torque)
     removed = jax.tree.map(lambda field: field.astype(force.dtype), removed)
     gap = stored(over_slices(mesh.corner_gap) + removed.amount)
-    problem, solution = contact_of(mesh, gap, stored(removed.shift), load=force)
-    windup = mesh.hub * force / mesh.pair.face_width
-    contact_stiffness = tangent_stiffness(problem, solution)
-    unloaded = minimum(problem.gap / problem.levers, axis=(0, 1))
-    status = contact_status(mesh, solution, solution.approach, removed)
+    contact = contact_of(mesh, gap, stored(removed.shift), load=force)
+    solution, windup = contact.solution, mesh.hub * force / mesh.pair.face_width
+    unloaded = minimum(contact.gap / over_slices(mesh.lever), axis=(0, 1))
+    status = contact_status(mesh, contact, solution.approach, removed)
     if mesh.support_torque is not None:
         status = status_of({Status.OUT_OF_VALIDITY: ~holds_at(mesh.support_torque, torque)}, status)
     return {
@@ -364,7 +413,7 @@ def _solve_removed(mesh: Mesh, torque: Scalar, removed: RemovedMaterial) -> dict
         "gap": gap,
         "shift": removed.shift,
         "relative_curvature": removed.relative_curvature,
-        "tangent_stiffness": 1 / (1 / contact_stiffness + mesh.hub / mesh.pair.face_width),
+        "tangent_stiffness": 1 / (1 / contact.tangent_stiffness + mesh.hub / mesh.pair.face_width),
         "residual": solution.residual,
         "status": status,
     }

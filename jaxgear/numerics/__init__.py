@@ -1,5 +1,7 @@
 """Numerical tools without a gear word: fields, safe functions, extremes, quadrature, roots, complementarity, risk."""
 
+from .alternation import Alternation as Alternation
+from .alternation import nearest as nearest
 from .batching import on_both as on_both
 from .batching import over_batch as over_batch
 from .complementarity import solve_contact as solve_contact
@@ -7,6 +9,7 @@ from .complementarity import tangent_stiffness as tangent_stiffness
 from .contact_problem import AbstractSpring as AbstractSpring
 from .contact_problem import ContactProblem as ContactProblem
 from .contact_problem import ContactSolution as ContactSolution
+from .contact_system import opening as opening
 from .conversion import Frozen as Frozen
 from .conversion import Given as Given
 from .conversion import Numbers as Numbers

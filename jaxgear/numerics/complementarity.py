@@ -192,7 +192,7 @@ def _iterate(
 
 
 def _cast(tree, dtype):
-    return jax.tree.map(lambda leaf: leaf.astype(dtype), tree)
+    return jax.tree.map(lambda leaf: leaf if leaf.dtype == bool else leaf.astype(dtype), tree)
 
 
 @partial(_solve.defjvp, symbolic_zeros=True)

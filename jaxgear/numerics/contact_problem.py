@@ -46,7 +46,8 @@ class ContactProblem(eqx.Module):
 
     Attributes:
         compliance: C, shape (pairs, pairs, positions); or of every slice, (pairs, pairs, slices, positions), where
-            slices are not coupled.
+            slices are not coupled. Where only some of the springs can touch (`SliceCoupling.alternation`) it is that of
+            all, and what follows is of these alone.
         law: h(q) of every spring.
         gap: shape (pairs, slices, positions).
         lever: what a spring closes per unit of common approach, positive, shape (pairs, positions) or (pairs, slices,
@@ -63,7 +64,7 @@ class ContactProblem(eqx.Module):
         ValueError: unless one of load and approach is given.
     """
 
-    compliance: Float[Array, "pairs pairs *own positions"]
+    compliance: Float[Array, "springs springs *own positions"]
     law: AbstractSpring
     gap: Float[Array, "pairs slices positions"]
     lever: Float[Array, "pairs *each positions"]
@@ -85,8 +86,9 @@ class ContactProblem(eqx.Module):
     @property
     def own_compliance(self) -> Float[Array, "pairs #slices positions"]:
         """C of every spring on its own."""
-        own = over_slices(jnp.stack([self.compliance[i, i] for i in range(len(self.compliance))]))
-        return own if self.coupling is None or self.coupling.scale is None else own * self.coupling.scale**2
+        if self.coupling is not None:
+            return self.coupling.own(self.compliance)
+        return over_slices(jnp.stack([self.compliance[i, i] for i in range(len(self.compliance))]))
 
 
 class ContactSolution(eqx.Module):

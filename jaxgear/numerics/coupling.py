@@ -32,12 +32,13 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from .alternation import Alternation
 from .dense import solve_dense
 from .elimination import Curve, Factors, Load, Rows, Slopes, inverse_of, over_slices, small_inverse
 from .safe import stored, unit
 
-Springs = Float[Array, "pairs pairs *own positions"]
-Blocks = Float[Array, "modes modes pairs pairs positions"]
+Springs = Float[Array, "springs springs *own positions"]
+Blocks = Float[Array, "modes modes springs springs positions"]
 Levers = Float[Array, "pairs *each positions"]
 
 
@@ -45,13 +46,13 @@ class Held(NamedTuple):
     """What an elimination needs besides the coupling itself.
 
     Attributes:
-        local: rest C; of every slice where they are scaled.
+        local: rest C; of every slice where they are scaled, of the springs that can touch.
         inverse: of C.
         share_inverse: of M.
         modal: inverse of M x C where a second body feels loads otherwise; None without one.
     """
 
-    local: Springs
+    local: Float[Array, "pairs pairs *own positions"]
     inverse: Springs
     share_inverse: Float[Array, "modes modes"]
     modal: Blocks | None = None
@@ -61,7 +62,7 @@ class Held(NamedTuple):
         """`local` with an axis of slices."""
         return self.local if self.local.ndim == 4 else self.local[:, :, None]
 
-    def column(self, mode: int) -> Float[Array, "rows pairs pairs positions"]:
+    def column(self, mode: int) -> Float[Array, "rows springs springs positions"]:
         """Inverse of M x C in the columns of a mode, from the rows of this mode on."""
         if self.modal is not None:
             return self.modal[mode:, mode]
@@ -94,7 +95,9 @@ class SliceCoupling(eqx.Module):
         other: of two bodies that spread loads in their own way each; None where both do alike.
         weight: w of the slices, over their mean; None where all are equal.
         scale: D, of loads and deflections of every spring, where a body is stiffer at one place than at another: D C D
-            stands for C; None where it is not.
+            stands for C; None where it is not. Of the springs that can touch alone, where there are others.
+        alternation: which springs can touch, where only some can: loads, deflections, levers and scales then are those
+            of these two; None where all can.
         held: for eliminations, see `with_inverses`; None before.
     """
 
@@ -107,22 +110,37 @@ class SliceCoupling(eqx.Module):
     other: Other | None = None
     weight: Float[Array, " slices"] | None = None
     scale: Float[Array, "pairs slices positions"] | None = None
+    alternation: Alternation | None = None
     held: Held | None = None
 
     def deflection(self, compliance: Springs, lever: Levers, load: Rows) -> Rows:
         """y under line loads."""
-        scaled = self.scaled(load)
+        scaled = self.springs(self.scaled(load))
         result = self._spread(compliance, self.share, self.rest, scaled)
         if self.other is not None:
             more = self._spread(self.other.compliance, self.other.share, self.other.rest, scaled)
             result = [row + added for row, added in zip(result, more)]
-        result = self.scaled(result)
+        result = self.scaled(self.touching(result))
         bent = self.support_deflection(lever, load)
         return result if bent is None else [row + height * bent for row, height in zip(result, over_slices(lever))]
 
     def scaled(self, rows: Rows) -> Rows:
         """Rows of the springs times their scale."""
         return rows if self.scale is None else [d * row for d, row in zip(self.scale, rows)]
+
+    def springs(self, rows: Rows) -> Rows:
+        """Rows of all springs from rows of those that can touch."""
+        return rows if self.alternation is None else self.alternation.springs(rows)
+
+    def touching(self, springs: Rows) -> Rows:
+        """Rows of the springs that can touch from rows of all springs."""
+        return springs if self.alternation is None else list(self.alternation.rows(jnp.stack(springs)))
+
+    def own(self, compliance: Springs) -> Float[Array, "pairs #slices positions"]:
+        """Compliance of every spring on its own."""
+        own = over_slices(jnp.stack([compliance[i, i] for i in range(len(compliance))]))
+        own = own if self.alternation is None else self.alternation.rows(own)
+        return own if self.scale is None else own * self.scale**2
 
     def _spread(self, compliance: Springs, share: Float[Array, "modes modes"], rest, load: Rows) -> Rows:
         uniform = [stored(sum(c[None] * q for c, q in zip(row, load))) for row in compliance]
@@ -150,9 +168,12 @@ def with_inverses(coupling: SliceCoupling, compliance: Springs) -> SliceCoupling
         other = coupling.other
         both = _blocks(coupling.share, compliance) + _blocks(other.share, other.compliance)
         held = held._replace(local=held.local + other.rest * other.compliance, modal=_block_inverse(both))
+    if coupling.alternation is not None:
+        held = held._replace(local=coupling.alternation.matrix(held.local))
     if coupling.scale is not None:
         of_slices = coupling.scale[:, None] * coupling.scale[None]
-        held = held._replace(local=held.local[:, :, None] * of_slices)
+        local = held.local if held.local.ndim == 4 else held.local[:, :, None]
+        held = held._replace(local=local * of_slices)
     return eqx.tree_at(lambda c: c.held, coupling, held, is_leaf=lambda leaf: leaf is None)
 
 
@@ -202,7 +223,7 @@ def _outer(weight: Float[Array, " modes"], row: Float[Array, "... positions"]) -
 
 Bends = Float[Array, "bends positions"]
 Inverse = list[list[Float[Array, "slices positions"]]]  # of every slice on its own, by springs
-Sides = Float[Array, "sides pairs positions"]  # right sides of the modal system, of one mode
+Sides = Float[Array, "sides springs positions"]  # right sides of the modal system, of one mode
 
 
 class _Block(NamedTuple):
@@ -214,9 +235,9 @@ class _Block(NamedTuple):
         inverse: of D.
     """
 
-    scaled: Float[Array, "modes pairs pairs positions"]
-    lower: Float[Array, "below pairs pairs positions"]
-    inverse: Float[Array, "pairs pairs positions"]
+    scaled: Float[Array, "modes springs springs positions"]
+    lower: Float[Array, "below springs springs positions"]
+    inverse: Float[Array, "springs springs positions"]
 
 
 class CoupledFactors(NamedTuple):
@@ -262,7 +283,7 @@ def couple(coupling: SliceCoupling, lever: Levers, own: Factors) -> CoupledFacto
     inverse = inverse_of(own)
     if coupling.weight is not None:
         inverse = [[coupling.weighted(x) for x in row] for row in inverse]
-    modal = _products(coupling.modes, _scaled_both(coupling, inverse))
+    modal = _products(coupling, _scaled_both(coupling, inverse))
     blocks = _eliminated(coupling, modal)
     right, force = _of_support(coupling, lever, inverse, modal)
     bent = _ahead(blocks, right)
@@ -278,16 +299,20 @@ def _scaled_both(coupling: SliceCoupling, inverse: Inverse) -> Inverse:
     return [[d * x * other for x, other in zip(row, coupling.scale)] for d, row in zip(coupling.scale, inverse)]
 
 
-def _products(modes: Float[Array, "slices modes"], rows: Inverse) -> list[Float[Array, "_ pairs pairs positions"]]:
+def _products(coupling: SliceCoupling, rows: Inverse) -> list[Float[Array, "_ springs springs positions"]]:
     """V^T rows V: of every mode with itself and those after it, by mode."""
-    springs = range(len(rows))
+    modes, alternation = coupling.modes, coupling.alternation
+    springs = range(len(rows) if alternation is None else len(alternation.chosen))
     half = [(i, j) for i in springs for j in range(i + 1)]
-    stack = jnp.stack([rows[i][j] for i, j in half])
+    if alternation is None:
+        stack = jnp.stack([rows[i][j] for i, j in half])
+    else:
+        stack = jnp.stack([jnp.where(alternation.together(i, j), rows[i % 2][j % 2], 0.0) for i, j in half])
     place = np.array([[half.index((max(i, j), min(i, j))) for j in springs] for i in springs])
     return [onto(mode[:, None] * modes[:, k:], stack)[:, place] for k, mode in enumerate(modes.T)]
 
 
-def _eliminated(coupling: SliceCoupling, modal: list[Float[Array, "_ pairs pairs positions"]]) -> list[_Block]:
+def _eliminated(coupling: SliceCoupling, modal: list[Float[Array, "_ springs springs positions"]]) -> list[_Block]:
     held = coupling.held
     blocks: list[_Block] = []
     assert held is not None  # whoever eliminates gives the inverses
@@ -314,14 +339,14 @@ def _of_support(
 ) -> tuple[list[Sides], Float[Array, "bends bends positions"]]:
     """V^T A^-1 X by mode, and X^T A^-1 X."""
     shapes = coupling.support_modes
-    if shapes is None and coupling.scale is None:
+    if shapes is None and coupling.scale is None and coupling.alternation is None:
         # what the common approach presses is the first mode
         even = reduce(add, [modal[0][:, :, i] * height[None, None] for i, height in enumerate(lever)])
         return list(even[:, None]), reduce(add, list(even[0] * lever))[None, None]
     heights = over_slices(lever)
     shapes = _constant(coupling) if shapes is None else shapes
     pressed = [sum(x * height for x, height in zip(row, heights)) for row in inverse]
-    modal_pressed = jnp.stack(coupling.scaled(pressed))
+    modal_pressed = jnp.stack(coupling.springs(coupling.scaled(pressed)))
     right = [onto(mode[:, None] * shapes, modal_pressed) for mode in coupling.modes.T]
     force = sum(row * height for row, height in zip(pressed, heights))
     return right, jnp.stack([onto(shape[:, None] * shapes, force) for shape in shapes.T])
@@ -342,17 +367,17 @@ def _ahead(blocks: list[_Block], right: list[Sides]) -> tuple[list[Sides], list[
 
 
 def _joined(
-    first: list[Sides], second: list[Float[Array, "others pairs positions"]]
+    first: list[Sides], second: list[Float[Array, "others springs positions"]]
 ) -> Float[Array, "sides others positions"]:
     """Sum over modes and springs."""
     return reduce(add, [summed(a[:, None] * b[None], 2) for a, b in zip(first, second)])
 
 
 def _back(
-    blocks: list[_Block], divided: list[Float[Array, "pairs positions"]]
-) -> list[Float[Array, "pairs positions"]]:
+    blocks: list[_Block], divided: list[Float[Array, "springs positions"]]
+) -> list[Float[Array, "springs positions"]]:
     """Solution of the modal system by mode, from D^-1 L^-1 of its right side."""
-    found: dict[int, Float[Array, "pairs positions"]] = {}
+    found: dict[int, Float[Array, "springs positions"]] = {}
     for mode in reversed(range(len(blocks))):
         value = divided[mode]
         for later in range(mode + 1, len(blocks)):
@@ -374,7 +399,7 @@ def respond(
     inside = [sum(x * row for x, row in zip(rows, known)) for rows in factors.inverse]  # A^-1 known
     kept = unit(factors.inverse[0][0])
     within = [row / kept for row in inside]
-    stacked = jnp.stack(coupling.scaled(within))
+    stacked = jnp.stack(coupling.springs(coupling.scaled(within)))
     # mode by mode: compilers take a sum for all modes in every loop that reads one of them
     _, divided = _ahead(factors.blocks, [onto(mode[:, None], stacked) for mode in coupling.modes.T])
     heights = over_slices(factors.lever)
@@ -386,7 +411,7 @@ def respond(
     eliminated = [a[0] + summed(b * bends[:, None]) for a, b in zip(divided, factors.bent[1])]
     deflected = along(coupling.modes, jnp.stack(_back(factors.blocks, eliminated)))
     even = along(shapes, bends)
-    yielded = coupling.scaled([deflected[:, i] for i in range(len(heights))])
+    yielded = coupling.scaled(coupling.touching([deflected[:, i] for i in range(deflected.shape[1])]))
     pressed = [height * even - back for height, back in zip(heights, yielded)]
     pressed = [row / kept for row in pressed]
     loads = [row + sum(x * value for x, value in zip(rows, pressed)) for row, rows in zip(within, factors.inverse)]
