@@ -164,8 +164,8 @@ def mesh_tables(
     made = mesh_force(mesh, load, pinion=pinion, wheel=wheel, positions=positions, levels=levels)
     cycles = [solve(mesh, each, pinion=pinion, wheel=wheel) for each in jnp.asarray(every, load.dtype)]
     error = jnp.stack([cycle.transmission_error for cycle in cycles])
-    found, order = harmonics(error, count), np.arange(1, count + 1)
     phase, first = np.asarray(cycles[0].phase), float(mesh.kinematics.first_phase)
+    found = harmonics(error, count, first_phase=first)
     start, force = np.asarray(made.start), np.asarray(made.node_force)  # type: ignore[attr-defined]
     beyond = start[..., None] + np.asarray(dte_levels(made.reach, levels))  # type: ignore[attr-defined]
     gears = mesh.pair.pinion, mesh.pair.wheel
@@ -175,10 +175,9 @@ def mesh_tables(
         phase=phase,
         transmission_error=np.asarray(error),
         stiffness=np.stack([np.asarray(cycle.tangent_stiffness) for cycle in cycles]),
-        order=order,
+        order=np.arange(1, count + 1),
         amplitude=np.asarray(found.amplitude),
-        # counted from the phase 0, not from the first position
-        order_phase=(np.asarray(found.phase) - 360 * first * order + 180) % 360 - 180,
+        order_phase=np.asarray(found.phase),
         map_phase=np.asarray(first + np.arange(positions) / positions),
         # without backlash rounding may swap the ends of the clearance
         map_dte=np.maximum.accumulate(np.concatenate([-beyond[1, :, ::-1], beyond[0]], axis=1), axis=1),

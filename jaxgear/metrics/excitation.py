@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ..contact import MeshCycle
-from ..numerics import Checked, Given, over_batch, program, result, safe_divide, spread
+from ..numerics import Checked, Given, over_batch, program, real, result, safe_divide, spread
 from ..numerics.reductions import Range
 
 Curves = TypeVar("Curves", Array, np.ndarray)
@@ -49,25 +49,36 @@ def smooth_peak_to_peak(curve: Curve, smoothing: Given) -> Float[Array, "..."]:
     return Range().soft(curve, smoothing)
 
 
-def harmonics(curve: Curve, count: int = 5) -> Harmonics:
-    """Amplitudes and phases of the first `count` mesh harmonics; amplitude_n = 2 |mean(curve e^(-2 pi i n psi))|."""
+def harmonics(curve: Curve, count: int = 5, *, first_phase: Given = 0.0) -> Harmonics:
+    """Amplitudes and phases of the first `count` mesh harmonics; amplitude_n = 2 |mean(curve e^(-2 pi i n psi))|.
+
+    Args:
+        curve: values at equally spaced positions over one base pitch.
+        count: number of harmonics.
+        first_phase: mesh position psi of the first of them [base pitches], `cycle.phase[0]`; -1/2 with an odd number of
+            pairs. Amplitudes do not depend on it.
+
+    Raises:
+        ValueError: for more harmonics than the positions resolve.
+    """
     positions = curve.shape[-1]
     if not 1 <= count < positions / 2:
         raise ValueError(f"harmonics: count = {count} must be at least 1 and less than half of {positions} positions")
-    return Harmonics(*_amplitudes_and_phases(curve, count))
+    return Harmonics(*_amplitudes_and_phases(curve, count, real(first_phase).astype(curve.dtype)))
 
 
 @partial(jax.jit, static_argnums=1, inline=True)
-def _amplitudes_and_phases(curve, count):
+def _amplitudes_and_phases(curve, count, first):
     positions = curve.shape[-1]
     order = jnp.arange(1, count + 1, dtype=curve.dtype)
-    angle = 2 * jnp.pi / positions * jnp.arange(positions, dtype=curve.dtype)[:, None] * order[None]
-    real = 2 / positions * (curve @ jnp.cos(angle))
+    phase = first + jnp.arange(positions, dtype=curve.dtype) / positions
+    angle = 2 * jnp.pi * phase[:, None] * order[None]
+    along = 2 / positions * (curve @ jnp.cos(angle))
     imaginary = -2 / positions * (curve @ jnp.sin(angle))
-    squared = real**2 + imaginary**2
+    squared = along**2 + imaginary**2
     present = squared > 0
     amplitude = jnp.where(present, jnp.sqrt(jnp.where(present, squared, 1.0)), 0.0)
-    phase = jnp.where(present, jnp.arctan2(jnp.where(present, imaginary, 0.0), jnp.where(present, real, 1.0)), 0.0)
+    phase = jnp.where(present, jnp.arctan2(jnp.where(present, imaginary, 0.0), jnp.where(present, along, 1.0)), 0.0)
     return amplitude, jnp.rad2deg(phase)
 
 

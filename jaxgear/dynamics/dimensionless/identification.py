@@ -78,8 +78,11 @@ def from_mesh(
     check("from_mesh", "torque", cycle.torque, "N m", low=0.0, open_low=True)
     curve = secant_stiffness(cycle) if stiffness == "secant" else cycle.tangent_stiffness
     mass, mean = real(mass), jnp.mean(curve)
-    parametric = harmonics(curve / mean, orders)
-    unloaded = harmonics(cycle.unloaded_transmission_error / half, orders)
+    # the phase 0 of the mesh is the time 0 of the model, with which the torque fluctuates
+    parametric, unloaded = (
+        harmonics(each, orders, first_phase=cycle.kinematics.first_phase)
+        for each in (curve / mean, cycle.unloaded_transmission_error / half)
+    )
     if damping is None:
         assert damping_ratio is not None  # one of both is given
         ratio = real(damping_ratio)
