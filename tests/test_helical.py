@@ -16,6 +16,8 @@ from jaxgear.compliance import finite_element_compliance
 from jaxgear.compliance.laws import LinearLaw
 from jaxgear.compliance.plate import axial_compliance
 from jaxgear.contact import helical_slices
+from jaxgear.contact.solve import wider_mesh
+from jaxgear.contact.status import Status
 from jaxgear.geometry import path_of_contact, tooth_thickness
 
 
@@ -110,6 +112,25 @@ def test_solution_meets_the_conditions():
     assert left.min() > -1e-8 and np.abs(left[load > 0]).max() < 1e-8
     assert (load > 0).any(axis=1).sum(axis=0).max() >= 2  # pairs share the load
     assert str(cycle).splitlines()[-1].split() == ["overlap", "ratio", "0.549"]
+
+
+def test_two_pairs_in_every_slice_are_all_that_touch():
+    """Of three pairs that touch over the face, a base pitch later; flanks that reach farther are told."""
+    _, every = solved()
+    mesh = jg.prepare(pair_of(), resolution=replace(SIZES, pairs=3))
+    assert mesh.alternates and not solved()[0].alternates
+    cycle = jg.solve(mesh, TORQUE)
+    later = np.roll(every.line_load, 4, axis=-1)[1:]
+    later[:, :, 4:] = np.asarray(every.line_load)[:3, :, :4]  # positions begin half a base pitch before
+    np.testing.assert_allclose(cycle.line_load, later, atol=1e-7)
+    for name in ("transmission_error", "tangent_stiffness"):
+        np.testing.assert_allclose(getattr(cycle, name), np.roll(getattr(every, name), 4), rtol=1e-9)
+    far = np.abs(mesh.kinematics.contact_path) > float(mesh.pair.base_pitch)
+    assert 0 < far.sum() and np.asarray(cycle.opening)[far].min() > 100.0
+    at = np.arange(8) == 4
+    reaching = jg.contact.solve_removed(mesh, TORQUE, np.where(far & at, -3000.0, 0.0))
+    np.testing.assert_array_equal(reaching.status, np.where(at, Status.MORE_PAIRS_NEEDED, Status.CONVERGED))
+    assert not wider_mesh(replace(mesh, automatic=True), reaching.status).alternates
 
 
 def test_slices_far_along_the_path_touch_later():

@@ -123,6 +123,8 @@ def test_displaced_teeth_of_a_wheel_give_side_bands():
     for order in (1, Z2 - 1, Z2 + 1, 2 * Z2 - 1):
         assert bands[order - 1] == pytest.approx(expected[order], abs=0.004)
     assert bands[0] == pytest.approx(10.0, rel=0.01) and bands[Z2] > 0.1
+    around = side_bands(found, "wheel", count=2)
+    np.testing.assert_allclose(around, bands[np.array([Z2 - 2, Z2 - 1, Z2 + 1, Z2 + 2]) - 1], atol=1e-12)
     names = {line.order: line.name for line in named_orders(found, of_wheel(removed))}
     assert names[1] == "mesh" and names[Z2 + 1] == "wheel side band" and names[3] == "mesh"
 

@@ -288,11 +288,14 @@ def test_samples_depend_on_seed_and_number_only(mesh, tolerance):
 
 
 def test_common_random_numbers_scale_with_the_limits(mesh, tolerance):
-    """Twice the tolerance is twice the same deviation: designs and tolerances are compared on the same gears."""
+    """Twice the tolerance is twice the same deviation, three times of the wheel: designs and tolerances are compared
+    on the same gears."""
     once = tolerance.without_lead()
-    twice = jg.Tolerance(*(jax.tree.map(lambda limit: 2 * limit, gear) for gear in (once.pinion, once.wheel)))
-    for a, b in zip(*(jax.tree.leaves(jg.tolerance.sample_deviations(t, mesh, COUNT, seed=2)) for t in (once, twice))):
-        np.testing.assert_allclose(2 * np.asarray(a), b, rtol=1e-12)
+    grown = (jax.tree.map(lambda limit, by=by: by * limit, gear) for gear, by in ((once.pinion, 2), (once.wheel, 3)))
+    first, then = (jg.tolerance.sample_deviations(t, mesh, COUNT, seed=2) for t in (once, jg.Tolerance(*grown)))
+    for by, *gears in ((2, first.pinion, then.pinion), (3, first.wheel, then.wheel)):
+        for a, b in zip(*map(jax.tree.leaves, gears), strict=True):
+            np.testing.assert_allclose(by * np.asarray(a), b, rtol=1e-12)
 
 
 def test_monte_carlo_holds_the_samples_of_its_seed(mesh, tolerance):

@@ -2,9 +2,7 @@
 
 import equinox as eqx
 import jax.numpy as jnp
-from jaxtyping import Array, Bool, Float
-
-from .elimination import Rows
+from jaxtyping import Array, Bool, Float, Shaped
 
 Flags = Bool[Array, "slices positions"]
 
@@ -23,10 +21,11 @@ class Alternation(eqx.Module):
         both = [self._chosen(list(springs[first::2]), first) for first in (0, 1)]
         return jnp.stack([jnp.broadcast_to(row, self.chosen.shape[1:]) for row in both])
 
-    def springs(self, rows: Rows) -> Rows:
+    def springs(self, rows: list[Shaped[Array, "slices positions"]]) -> list[Shaped[Array, "slices positions"]]:
         """What all springs have, from what those have that can touch: nothing where they cannot."""
+        none = jnp.zeros_like(rows[0])
         return [
-            rows[i % 2] if self.alone(i) else jnp.where(flag, rows[i % 2], 0.0) for i, flag in enumerate(self.chosen)
+            rows[i % 2] if self.alone(i) else jnp.where(flag, rows[i % 2], none) for i, flag in enumerate(self.chosen)
         ]
 
     def matrix(self, whole: Float[Array, "springs springs positions"]) -> Float[Array, "2 2 slices positions"]:
@@ -48,7 +47,7 @@ class Alternation(eqx.Module):
         flags = [self.chosen[i] for i in {one, other} if not self.alone(i)]
         return flags[0] & flags[-1] if flags else True
 
-    def _chosen(self, rows: Rows, first: int) -> Float[Array, "slices positions"]:
+    def _chosen(self, rows: list[Float[Array, "..."]], first: int) -> Float[Array, "..."]:
         found = rows[0]
         for row, flag in zip(rows[1:], self.chosen[first + 2 :: 2]):
             found = jnp.where(flag, row, found)
