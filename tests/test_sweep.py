@@ -14,19 +14,15 @@ from catalogue import LINE, gear_pair
 from scipy.stats.mstats import hdquantiles
 
 import jaxgear as jg
-from jaxgear.dynamics import DYNAMIC_QUANTITIES
-from jaxgear.metrics import LUBRICANT_QUANTITIES, STRENGTH_QUANTITIES
 from jaxgear.sweeps.columns import FLAG, NUMBER, Column, described
 from jaxgear.sweeps.store import Manifest, Store, load_manifest
 from jaxgear.sweeps.table import front, smallest
 from jaxgear.vocabulary import quantities
-from jaxgear.wear import WEAR_QUANTITIES
 
 BOUNDS = {"pinion": (0.0, 20.0), "wheel": (0.0, 20.0), "length": (1.0, 5.5)}
 # without those that need a speed, several slices or settings
 SLICED = "face_load_factor", "mean_face_load_factor", "root_face_load_factor", "edge_load_factor"
-OTHERS = (*LUBRICANT_QUANTITIES, *STRENGTH_QUANTITIES, *SLICED, *DYNAMIC_QUANTITIES, *WEAR_QUANTITIES)
-NAMES = tuple(name for name in quantities if name not in OTHERS)
+NAMES = tuple(name for name, quantity in quantities.items() if quantity.takes is None and name not in SLICED)
 # of the curves, the contact, the gears and the flanks
 FEW = ("ppte", "max_flank_pressure", "effective_contact_ratio", "wheel_tip_land", "removed_material")
 PLAN = jg.Sobol(BOUNDS, 40, seed=5)
