@@ -72,15 +72,17 @@ def pytest_sessionstart(session):
         session.config.pluginmanager.register(Costs(session.config))
 
 
-# Files of tests that take the longest come first: at the end, one of them would keep a single worker busy.
+# Files of tests that take the longest come first: at the end, one of them would keep a single worker busy. Those that
+# need the same programs are far from each other, since two workers would compile them at the same time.
 LONGEST = (
-    "examples guides reproductions slice_widths cli layout_command wear_command face_coupling dynamic_wear tolerance "
-    "finite_element_compliance face_widths wear dynamics_command speed_sweep layout mesh_cycle optimize"
+    "examples guides reproductions layout_command slice_widths cli wear_command face_coupling dynamic_wear tolerance "
+    "finite_element_compliance face_widths wear dynamics_command speed_sweep layout mesh_cycle optimize helical"
 ).split()
 
 
 def pytest_collection_modifyitems(items):
-    items.sort(key=lambda item: item.path.stem.removeprefix("test_") not in LONGEST)
+    places = {f"test_{name}": place for place, name in enumerate(LONGEST)}
+    items.sort(key=lambda item: places.get(item.path.stem, len(places)))
 
 
 # Collections of the oldest objects took a fifth of the time of tracing: a trace makes many objects, and each collection

@@ -4,7 +4,7 @@ from functools import cache
 
 import jaxgear as jg
 
-SIZES = jg.Resolution(positions=8, slices=5, pairs=4, newton_steps=12)
+SIZES = jg.Resolution(positions=8, slices=5, pairs=3, newton_steps=12)
 TORQUE = 150.0
 
 
@@ -17,10 +17,16 @@ def pair_of(beta=15.0, width=20.0, bores=(20.0, 100.0), **given) -> jg.GearPair:
     )
 
 
+def flanks(slope=0.0, relief=0.0):
+    """A lead slope of the pinion and the same tip relief of both gears [um]: one program for all that have either."""
+    tip = jg.TipRelief(relief, 4.0)
+    return {"pinion": jg.LeadSlope(slope) + tip, "wheel": tip}
+
+
 @cache
-def solved(beta=15.0, slope=0.0) -> tuple[jg.Mesh, jg.MeshCycle]:
+def solved(beta=15.0, slope=0.0, relief=0.0) -> tuple[jg.Mesh, jg.MeshCycle]:
     mesh = jg.prepare(pair_of(beta), resolution=SIZES)
-    return mesh, jg.solve(mesh, TORQUE, pinion=jg.LeadSlope(slope))
+    return mesh, jg.solve(mesh, TORQUE, **flanks(slope, relief))
 
 
 @cache

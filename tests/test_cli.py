@@ -146,7 +146,7 @@ def optimized(request):
     return request.getfixturevalue(request.param)
 
 
-@pytest.fixture(scope="module", params=["iterated", pytest.param("minimized", marks=pytest.mark.slow)])
+@pytest.fixture(scope="module", params=["iterated", "minimized"])
 def verified(request):
     return request.getfixturevalue(request.param)
 
@@ -486,6 +486,7 @@ def test_the_numbers_are_those_of_the_mesh_on_which_the_search_ended(optimized):
     assert "ppte [um]" not in optimized.out  # the row above says it
 
 
+@pytest.mark.slow
 def test_every_design_is_verified_by_finite_elements(folder, verified):
     designs, judged = verified.summary["designs"], verified.summary["optimum"]["method"] == "slp"  # by an objective
     found = {name: design["verified"] for name, design in designs.items()}
@@ -588,6 +589,7 @@ def test_a_limit_that_no_design_keeps_is_no_success(robust):
     assert "constraints are not met" in robust.err
 
 
+@pytest.mark.slow
 def test_another_method_reports_like_every_other(iterated):
     assert iterated.code == 0 and "quick run" not in iterated.out
     optimum, designs = iterated.summary["optimum"], iterated.summary["designs"]

@@ -1,10 +1,10 @@
 """Tables of a mesh for other programs: what they hold agrees with the contact, and the command `jaxgear export`."""
 
+import importlib
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from catalogue import LINE, gear_pair
 from commands import FIXED, assert_refused, call
 from helical_pairs import SIZES, pair_of
 
@@ -16,13 +16,16 @@ from jaxgear.io.folder import RESULT_FILES
 from jaxgear.studies import ExportStudy
 
 RELIEF = jg.TipRelief(6.0, 4.0)
+POSITIONS = 16  # of the force map, that of the command too: one program for both
 
 
 @pytest.fixture(scope="module")
-def spur():
+def spur(tmp_path_factory):
     """A mesh, and its tables at 50 N m and close to it."""
-    mesh = jg.prepare(gear_pair(), resolution=LINE)
-    return mesh, dynamics.mesh_tables(mesh, 50.0, [30.0, 49.9, 50.1], pinion=RELIEF, positions=16, levels=16)
+    path = tmp_path_factory.mktemp("export") / "pair.toml"
+    path.write_text(FIXED, encoding="utf-8")
+    mesh = load_design(path).mesh()
+    return mesh, dynamics.mesh_tables(mesh, 50.0, [30.0, 49.9, 50.1], pinion=RELIEF, positions=POSITIONS)
 
 
 def written(path):
@@ -71,7 +74,7 @@ def test_files_say_units_signs_and_axes(spur, tmp_path):
     assert columns == ["phase", "30_Nm", "49.9_Nm", "50_Nm", "50.1_Nm"] and "[um]" in about[0]
     np.testing.assert_allclose(rows[:, 1:].T, tables.transmission_error, rtol=1e-8)
     about, columns, rows = written(tmp_path / "force_map.csv")
-    assert columns == ["phase", "dte_um", "force_N"] and rows.shape == (16 * 32, 3)
+    assert columns == ["phase", "dte_um", "force_N"] and rows.shape == (16 * 96, 3)
     np.testing.assert_allclose(rows[:, 2], tables.map_force.ravel(), rtol=1e-8)
     _, columns, rows = written(tmp_path / "te_orders.csv")
     assert columns == ["torque_Nm", "order", "amplitude_um", "phase_deg"] and len(rows) == 4 * 7
@@ -105,7 +108,8 @@ def test_what_is_refused(spur, given, message):
     assert message in str(refused.value) and "\n" not in str(refused.value)
 
 
-def test_the_command(tmp_path):
+def test_the_command(tmp_path, monkeypatch):
+    monkeypatch.setattr(importlib.import_module("jaxgear.studies.export"), "_QUICK_POSITIONS", POSITIONS)
     path = tmp_path / "pair.toml"
     path.write_text(FIXED, encoding="utf-8")
     assert_refused(call("export", tmp_path / "none.toml"), "none.toml: No such file")

@@ -329,7 +329,8 @@ def test_finer_and_verifying_meshes_stand_on_the_same_support(on_table):
         np.testing.assert_array_equal(other.coupling.support, on_table.coupling.support)
 
 
-@pytest.mark.parametrize("derivative", [jax.jacfwd, pytest.param(jax.jacrev, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("derivative", [jax.jacfwd, jax.jacrev])
 def test_no_load_leaves_finite_numbers_and_derivatives(mesh, derivative):
     found = jg.solve(mesh, 0.0, pinion=SLOPE)
     np.testing.assert_allclose(found.line_load, 0.0, atol=1e-6)

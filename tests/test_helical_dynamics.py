@@ -2,11 +2,12 @@
 
 from functools import cache
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from helical_pairs import SIZES, TORQUE, pair_of
+from helical_pairs import SIZES, TORQUE, flanks, pair_of
 
 import jaxgear as jg
 from jaxgear import dynamics
@@ -18,7 +19,7 @@ from jaxgear.dynamics.integrate import one_cycle, steps_of
 from jaxgear.dynamics.oscillator import at_rest
 from jaxgear.geometry.involute import half_tooth_angle
 
-SLOPE = {"pinion": jg.LeadSlope(16.0)}
+SLOPE = flanks(16.0)
 MAP = {"torque": TORQUE, "positions": 8, "reach": 3.5}
 
 
@@ -33,6 +34,9 @@ mesh_of = cache(prepared)
 def mapped(beta=15.0) -> tuple[jg.Mesh, dynamics.ForceMap]:
     mesh = mesh_of(beta)
     return mesh, dynamics.mesh_force(mesh, **MAP, **SLOPE)
+
+
+resting = eqx.filter_jit(at_rest)
 
 
 def static_force(mesh, share=1.0):
@@ -177,7 +181,7 @@ def test_bearings_carry_the_axial_force():
     """F tan(beta_b): a right-hand pinion that drives counterclockwise, seen from the positive end, is pushed there."""
     for beta in (15.0, -15.0):
         oscillator = held(beta=beta)
-        found = at_rest(oscillator, jnp.asarray(0.2))
+        found = resting(oscillator, jnp.asarray(0.2))
         load = float(static_force(mesh_of()))
         along = load * np.tan(float(pair_of(beta).pinion.base_helix_angle))
         x = np.asarray(found.coordinates)
@@ -206,7 +210,7 @@ def test_natural_frequencies_are_those_of_the_inclined_spring():
     stiff[:, 2, 2] = 1e7
     plane = held(BEARINGS[:, :2, :2])
     assert plane.direction.shape == (5,)
-    rigid, flat = (at_rest(each, jnp.asarray(0.2)).coordinates for each in (held(stiff), plane))
+    rigid, flat = (resting(each, jnp.asarray(0.2)).coordinates for each in (held(stiff), plane))
     np.testing.assert_allclose(np.asarray(rigid)[[0, 1, 2, 4, 5]], flat, atol=1e-4)
 
 

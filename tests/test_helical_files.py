@@ -240,7 +240,7 @@ COMMAND = text(
     pinion=ANGLE + "\n[[pinion.modification]]\ntype = 'tip_relief'\namount = 20.0\nlength = 5.0",
     wheel="[[wheel.modification]]\ntype = 'tip_relief'\namount = 20.0\nlength = 5.0",
     load="torque_range = [25.0, 50.0]\nspeed = 1000.0",
-    tail="[resolution]\npositions = 8\nslices = 5\npairs = 4\nnewton_steps = 12",
+    tail="[resolution]\npositions = 8\nslices = 5\npairs = 3\nnewton_steps = 12",
 )
 
 

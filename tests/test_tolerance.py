@@ -34,7 +34,9 @@ def mesh(pair):
 
 @pytest.fixture(scope="module")
 def wide_mesh(pair):
-    return jg.prepare(pair, resolution=FACE)
+    """Of gears of different face widths."""
+    wider = eqx.tree_at(lambda pair: pair.pinion.face_width, pair, 1.1 * pair.wheel.face_width)
+    return jg.prepare(wider, resolution=FACE)
 
 
 @pytest.fixture(scope="module")
@@ -200,10 +202,7 @@ def test_waviness_keeps_mean_line_and_form_tolerance(wide_mesh):
     assert heights.max() <= 6.0 * 1.005 and heights.max() > 5.5 and heights.min() < 0.5
 
 
-def test_deviated_material_is_the_sum_of_modifications(pair, tolerance):
-    """Of gears of different face widths."""
-    wider = eqx.tree_at(lambda pair: pair.pinion.face_width, pair, 1.1 * pair.wheel.face_width)
-    wide_mesh = jg.prepare(wider, resolution=FACE)
+def test_deviated_material_is_the_sum_of_modifications(wide_mesh, tolerance):
     deviation = sample(tolerance, wide_mesh, seed=5)
     sides = {}
     for side, design in RELIEF.items():

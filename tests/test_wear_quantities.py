@@ -146,6 +146,7 @@ def test_refuses_in_one_line(make, message):
     assert "\n" not in str(refused.value)
 
 
+@pytest.mark.slow
 def test_settings_may_be_traced(mesh):
     """Revolutions times the coefficient of wear is all that counts."""
     cycle = solve_case(mesh, TORQUE, NONE, NONE)
