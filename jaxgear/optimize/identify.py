@@ -247,43 +247,49 @@ def _directions(slopes: Float[Array, "sums unknowns"]) -> tuple[Vector, Float[Ar
 
 @program
 def _fit(problem: _Problem, data: Data, steps: int) -> _Fit:
-    """Gauss-Newton with Levenberg's damping; the size of the error of the model is a mean by probability."""
+    """Gauss-Newton with Levenberg's damping; the size of the error of the model is a mean by probability.
+
+    Where the search begins the error would explain what the unknowns do: it keeps its least size until they settle.
+    """
     errors = errors_of(data)
     sizes = jnp.asarray(_SIZES, data.value.dtype) * jnp.mean(data.noise)
     count = problem.turn.shape[1]
     unit = jnp.eye(count, dtype=data.value.dtype)
 
-    def judged(z: Vector, slopes: Array, *values: Rows) -> tuple[Scalar, Array]:
+    def judged(z: Vector, slopes: Array, known: Bool[Array, ""], *values: Rows) -> tuple[Scalar, Array]:
         """Size of the error of the model, and products of slopes and of what all values leave."""
         products = errors.products(jnp.stack([*slopes.T, *(data.value - each for each in values)], axis=1))
         weight = jax.nn.softmax(jax.vmap(lambda size: errors.evidence(size, products(size), z))(sizes))
-        size = jnp.sqrt(weight @ sizes**2 + problem.least_error**2)
+        size = jnp.sqrt(jnp.where(known, weight @ sizes**2, 0.0) + problem.least_error**2)
         return size, products(size)
 
     def step(state):
-        number, _, z, slopes, values, damping, move = state
+        number, _, known, z, slopes, values, damping, move = state
         new_slopes, new_values, fine = problem.jacobian(z + move, data)
-        _, product = judged(z, slopes, values, new_values)
+        _, product = judged(z, slopes, known, values, new_values)
         old, new = product[count, count] + z @ z, product[count + 1, count + 1] + (z + move) @ (z + move)
         better = fine & ((number == 0) | (new <= old * (1 + _ROUND_OFF)))  # at first nothing is known
         z = jnp.where(better, z + move, z)
         slopes, values = jnp.where(better, new_slopes, slopes), jnp.where(better, new_values, values)
         damping = jnp.clip(jnp.where(better, 0.1 * damping, 10 * damping), 1e-3, 1e6)
-        _, product = judged(z, slopes, values)
+        settled = better & (number > 0) & (jnp.max(jnp.abs(move)) < _SETTLED)
+        known = known | settled | (number >= steps // 2)
+        _, product = judged(z, slopes, known, values)
         move = solve_dense(product[:count, :count] + (1 + damping) * unit, product[:count, count] - z)
-        return number + 1, better, z, slopes, values, damping, move
+        return number + 1, better, known, z, slopes, values, damping, move
 
     z = jnp.zeros(count, data.value.dtype)
     slopes = jnp.zeros((data.value.shape[0], count), z.dtype)
-    start = (0, jnp.asarray(False), z, slopes, jnp.zeros_like(data.value), jnp.asarray(_DAMPING, z.dtype), z)
+    no, yes = jnp.asarray(False), jnp.asarray(True)
+    start = (0, no, no, z, slopes, jnp.zeros_like(data.value), jnp.asarray(_DAMPING, z.dtype), z)
 
     def goes_on(state):
-        number, better, *_, move = state
-        return (number < steps) & ((number == 0) | ~better | (jnp.max(jnp.abs(move)) > _LAST))
+        number, better, known, *_, move = state
+        return (number < steps) & (~known | ~better | (jnp.max(jnp.abs(move)) > _LAST))
 
-    _, _, z, slopes, values, _, move = jax.lax.while_loop(goes_on, step, start)
+    _, _, _, z, slopes, values, _, move = jax.lax.while_loop(goes_on, step, start)
     fine = jnp.any(slopes != 0) & (jnp.max(jnp.abs(move)) < _SETTLED)
-    size, product = judged(z, slopes, values)
+    size, product = judged(z, slopes, yes, values)
     covariance = solve_dense(product[:count, :count] + unit, unit)
     return _Fit(z, covariance, *_directions(errors.whitened(size, slopes)), values, size, fine)
 
@@ -316,7 +322,7 @@ def identify(
     single_pitch: Pitches | None = None,
     model_error: float = 0.02,
     candidates: Sequence[float] = (),
-    steps: int = 25,
+    steps: int = 50,
 ) -> Identified:
     """The unknowns of a design that gave a measured transmission error.
 

@@ -114,8 +114,9 @@ class DesignIdentification(AbstractStudy["IdentificationResult"]):
             prior, pitches = _prior(design), _single_pitch(design) if pitch else None
         data = read_measurement(measured, design.pair(), noise=noise)
         study = cls(design, quick, Path(measured), data, prior, torque_scale, offset, pitches)
+        sizes = study._sizes()
         try:
-            data.noise_on(study._sizes(), period_of(data, design.pair(), pitches, offset or None))
+            data.noise_on(sizes, period_of(data, design.pair(), pitches, offset or None))
         except ValueError as error:
             says = str(error).removeprefix("identify: ")
             key, help_ = next((key, help_) for begin, key, help_ in _HELP if says.startswith(begin))
