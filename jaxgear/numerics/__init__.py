@@ -10,6 +10,7 @@ from .contact_problem import AbstractSpring as AbstractSpring
 from .contact_problem import ContactProblem as ContactProblem
 from .contact_problem import ContactSolution as ContactSolution
 from .contact_system import opening as opening
+from .conversion import Callback as Callback
 from .conversion import Frozen as Frozen
 from .conversion import Given as Given
 from .conversion import Numbers as Numbers
@@ -50,7 +51,6 @@ from .programs import compile_quickly as compile_quickly
 from .programs import kernel as kernel
 from .programs import program as program
 from .programs import quick_jit as quick_jit
-from .progress import Callback as Callback
 from .reductions import maximum as maximum
 from .reductions import minimum as minimum
 from .reductions import spread as spread

@@ -1,7 +1,7 @@
-"""Numbers as JAX takes them, and as text; arrays that no optimizer takes for parameters."""
+"""What callers give: numbers as JAX takes them, and as text; arrays that no optimizer takes for parameters; a callback."""
 
 from collections.abc import Sequence
-from typing import Any, Generic, TypeVar, cast
+from typing import Any, Generic, Protocol, TypeVar, cast
 
 import equinox as eqx
 import jax
@@ -12,6 +12,14 @@ from jaxtyping import Array, Float
 # one number or an array of them, as whoever calls has them; and whatever `real` makes an array of
 Given = float | np.floating | np.integer | np.ndarray | jax.Array
 Numbers = Given | Sequence[Given] | Sequence[Sequence[Given]]
+
+
+class Callback(Protocol):
+    """Who wants to know how far a sweep or a search has come; an exception in it ends the work."""
+
+    def __call__(self, done: int, total: int, best: float | None, /) -> None:
+        """Is told the variants or steps done, all of them, and the best objective so far; None where none is sought."""
+
 
 _SHOWN = 6  # numbers of an array that are printed; of a longer one its range is
 
