@@ -1,4 +1,4 @@
-"""What callers give: numbers as JAX takes them, and as text; arrays that no optimizer takes for parameters; a callback."""
+"""What callers give: numbers as JAX takes them, and as text; arrays that no optimizer takes for parameters."""
 
 from collections.abc import Sequence
 from typing import Any, Generic, Protocol, TypeVar, cast
