@@ -19,8 +19,9 @@ from jaxgear.shafts import (
 )
 from jaxgear.shafts.stepped_beam import shear_coefficient
 
-PINION = jg.Gear(teeth=19, module=3.0, face_width=18.0, bore_diameter=24.0)
-WHEEL = jg.Gear(teeth=48, module=3.0, face_width=18.0, bore_diameter=40.0)
+# tip diameters as in the design files of other tests: one program for gears of this kind
+PINION = jg.Gear(teeth=19, module=3.0, face_width=18.0, bore_diameter=24.0, tip_diameter=63.0)
+WHEEL = jg.Gear(teeth=48, module=3.0, face_width=18.0, bore_diameter=40.0, tip_diameter=150.0)
 PAIR = jg.GearPair(PINION, WHEEL)
 LENGTH = 150.0
 TILTED = np.diag([300.0, 400.0, 0.0, 2e4, 3e4]) + 0.0

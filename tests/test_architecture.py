@@ -48,9 +48,14 @@ def layer(path: Path) -> str:
 
 
 @functools.cache
+def tree_of(path: Path):
+    return ast.parse(path.read_text(encoding="utf-8"))
+
+
+@functools.cache
 def nodes(path: Path):
     """All nodes of a file, and those at its module level."""
-    tree = ast.parse(path.read_text(encoding="utf-8"))
+    tree = tree_of(path)
     return [*ast.walk(tree)], set(tree.body)
 
 
@@ -215,7 +220,7 @@ def typed_files():
     """Places in the package of the files of its layers, and what is at their module level."""
     for path in FILES:
         if layer(path) in ORDER:
-            yield path.relative_to(PACKAGE).as_posix(), ast.parse(path.read_text(encoding="utf-8")).body
+            yield path.relative_to(PACKAGE).as_posix(), tree_of(path).body
 
 
 def test_public_signatures_are_typed():

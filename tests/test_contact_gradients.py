@@ -85,6 +85,7 @@ def test_all_modes_agree_with_central_differences():
     np.testing.assert_allclose(hessian, hessian.swapaxes(1, 2), rtol=1e-8, atol=1e-11 * scale)
 
 
+@pytest.mark.slow
 def test_jacobians_of_approach_and_loads():
     """dd/dF = 1/k_t; reciprocity: d(approach)/d(gap_i) = w_i dq_i/dF; gaps do not change the sum of the loads."""
 

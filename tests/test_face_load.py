@@ -164,6 +164,7 @@ def factor(values):
     return annex_e(support(box, 0), pinion=pinion, stations=11).face_load_factor
 
 
+@pytest.mark.slow
 def test_derivatives_are_central_differences():
     at = np.array([150.0, 40.0, 6.0, 4.0, 5.0])
     there, found = factor(at)

@@ -113,6 +113,7 @@ def sloped(numbers, nodes, start):
     return jax.tree.map(np.asarray, _sloped(jnp.asarray(numbers), nodes, start))
 
 
+@pytest.mark.slow
 def test_gradients_of_an_orbit():
     """Against central differences of the exact flow, and against our own. None passes through the start.
 

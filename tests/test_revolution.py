@@ -63,7 +63,7 @@ def rigid(places, removed):
     return best
 
 
-@pytest.mark.parametrize("shaped", [False, True])
+@pytest.mark.parametrize("shaped", [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_equal_teeth_repeat_the_mesh_cycle(shaped):
     teeth = Teeth(wheel=waves(0.0, 1) if shaped else TeethDeviations(np.zeros(Z2)))
     found = solve_revolution(mesh(), TORQUE, teeth, pinion=RELIEF, wheel=RELIEF)

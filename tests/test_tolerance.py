@@ -262,6 +262,7 @@ def with_pitch(deviation, pairs, amount):
     return jg.tolerance.Deviation(gear, deviation.wheel, deviation.misalignment)
 
 
+@pytest.mark.slow
 def test_misalignment_of_either_sign_acts_alike(wide_mesh):
     """Both signs are mirror images of each other, and tilt load to one end of the face."""
     zero = zero_deviation(wide_mesh)
