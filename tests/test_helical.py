@@ -126,7 +126,8 @@ def test_two_pairs_in_every_slice_are_all_that_touch():
     far = np.abs(mesh.kinematics.contact_path) > float(mesh.pair.base_pitch)
     assert 0 < far.sum() and np.asarray(cycle.opening)[far].min() > 100.0
     at = np.arange(8) == 4
-    reaching = jg.contact.solve_removed(mesh, TORQUE, np.where(far & at, -3000.0, 0.0))
+    removed = jg.contact.removed_material(mesh, TORQUE, **flanks()) + jnp.where(far & at, -3000.0, 0.0)
+    reaching = jg.contact.solve_removed(mesh, TORQUE, removed)
     np.testing.assert_array_equal(reaching.status, np.where(at, Status.MORE_PAIRS_NEEDED, Status.CONVERGED))
     assert not wider_mesh(replace(mesh, automatic=True), reaching.status).alternates
 
