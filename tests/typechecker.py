@@ -3,7 +3,6 @@
 The rest of an annotation is for mypy: an object of a wrong class has to meet the package's own message here.
 """
 
-import dataclasses
 import functools
 import inspect
 from typing import Any, get_args
@@ -26,18 +25,8 @@ def install():
             return functools.partial(jaxtyped, **options)
         own = decorated.__init__ if inspect.isclass(decorated) else decorated
         own = own.fget if isinstance(own, property) else getattr(own, "__func__", own)
-        if not any(map(_speaks_of_arrays, getattr(own, "__annotations__", {}).values())):
-            return decorated
-        if isinstance(decorated, property):
-            return property(jaxtyped(decorated.fget, **options))
-        if isinstance(decorated, classmethod | staticmethod):
-            return type(decorated)(jaxtyped(own, **options))
-        checked = _once(lambda: wrapped(own, **options), own)
-        if not inspect.isclass(decorated):
-            return checked
-        if dataclasses.is_dataclass(decorated):  # as jaxtyping does
-            decorated.__init__ = checked
-        return decorated
+        speaks = any(map(_speaks_of_arrays, getattr(own, "__annotations__", {}).values()))
+        return wrapped(decorated, **options) if speaks else decorated
 
     jaxtyping.jaxtyped = jaxtyped
     jaxtyping.install_import_hook("jaxgear", "typechecker.arrays")
@@ -56,39 +45,6 @@ def arrays(function):
         return checked()(*args, **options)
 
     return run
-
-
-def _once(checked, function):
-    """Calls the checked form for arguments and a result of classes, shapes and dtypes that it has not seen yet.
-
-    Nothing else decides what the check says, which takes longer than to call most of the functions. The checked form
-    is made when it is called.
-    """
-    known, checked = set(), functools.cache(checked)
-
-    @functools.wraps(function)
-    def run(*args, **options):
-        given = _kind(args), _kind(options)
-        if given in known:
-            found = function(*args, **options)
-            if (given, _kind(found)) in known:
-                return found
-        found = checked()(*args, **options)
-        known.update((given, (given, _kind(found))))
-        return found
-
-    return run
-
-
-def _kind(value):
-    """What a check of annotations sees of a value."""
-    if hasattr(value, "dtype"):
-        return value.__class__, getattr(value, "shape", None), value.dtype
-    if isinstance(value, tuple | list):
-        return value.__class__, *map(_kind, value)
-    if isinstance(value, dict):
-        return tuple((name, _kind(each)) for name, each in value.items())
-    return value.__class__
 
 
 def _speaks_of_arrays(hint) -> bool:

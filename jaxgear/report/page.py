@@ -240,6 +240,7 @@ CAPTIONS = {
     "revolution": "Transmission error over the first revolution of the gear with more teeth.",
     "orders": "Amplitudes of the transmission error over the order of the pinion, with what they come from.",
     "identified": "Measured transmission error with the standard deviation of its noise, and that of the flanks found.",
+    "pitch": "Single pitch deviations of both gears as identified, with their standard deviations.",
     "worn_pinion": "Flank of the pinion at several time steps.",
     "worn_wheel": "Flank of the wheel at several time steps.",
     "ppte_over_life": "PPTE over the life.",
