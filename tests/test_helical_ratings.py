@@ -7,7 +7,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from helical_pairs import SIZES, TORQUE, example, pair_of, solved
+from helical_pairs import SIZES, TORQUE, example, flanks, pair_of, solved
 
 import jaxgear as jg
 from jaxgear import metrics, sizing
@@ -339,7 +339,7 @@ def test_derivatives_of_the_cycle_by_the_angle_are_central_differences():
 def test_many_torques_at_once():
     mesh = solved()[0]
     one = solved()[1]
-    less = jg.solve(mesh, 75.0, pinion=jg.LeadSlope(0.0))
+    less = jg.solve(mesh, 75.0, **flanks())
     cycles = jax.tree.map(lambda *both: jnp.stack(both), less, one)
     for name in ("axial_force", "face_load_factor", "mesh_loss_factor", "pinion_local_root_stress", "shuttling_moment"):
         quantity = MESH_QUANTITIES[name]
