@@ -22,9 +22,13 @@ _PER_PITCH, _FEWEST_SLICES = 10, 11
 
 def pairs_for(pair: GearPair, deflection: float | None) -> int:
     """Pairs to carry along where a resolution leaves their number open, see `prepare`."""
-    if any(concrete(leaf) is None for leaf in jax.tree.leaves(pair)):
+    if _is_traced(pair):
         return _PAIRS_TRACED
     return fewest_pairs(pair, deflection=_contained(pair, deflection))
+
+
+def _is_traced(pair: GearPair) -> bool:
+    return any(concrete(leaf) is None for leaf in jax.tree.leaves(pair))
 
 
 def _contained(pair: GearPair, deflection: float | None) -> float:
@@ -38,7 +42,7 @@ def pairs_alternate(pair: GearPair, resolution: Resolution, deflection: float | 
     Those are the two pairs within a base pitch of the pitch point, as of a spur pair. Whoever carries along more pairs
     than the deflection needs gets all of them.
     """
-    if pair.is_spur or not resolution.is_coupled or any(concrete(leaf) is None for leaf in jax.tree.leaves(pair)):
+    if pair.is_spur or not resolution.is_coupled or _is_traced(pair):
         return False
     wanted = _contained(pair, deflection)
     if not 2 < resolution.chosen_pairs <= fewest_pairs(pair, deflection=wanted):

@@ -172,8 +172,7 @@ def with_inverses(coupling: SliceCoupling, compliance: Springs) -> SliceCoupling
         held = held._replace(local=coupling.alternation.matrix(held.local))
     if coupling.scale is not None:
         of_slices = coupling.scale[:, None] * coupling.scale[None]
-        local = held.local if held.local.ndim == 4 else held.local[:, :, None]
-        held = held._replace(local=local * of_slices)
+        held = held._replace(local=held.local_slices * of_slices)
     return eqx.tree_at(lambda c: c.held, coupling, held, is_leaf=lambda leaf: leaf is None)
 
 
