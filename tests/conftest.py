@@ -168,6 +168,13 @@ def _forget_compiled_programs():
         _forget()
 
 
+@pytest.fixture
+def room():
+    """For tests that compile as much as other files do: what was compiled before them goes once it is much."""
+    if _holds_much():
+        _forget()
+
+
 def _holds_much() -> bool:
     """Whether this process holds more than it should; true where the system does not say."""
     process = Path("/proc/self")

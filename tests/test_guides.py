@@ -7,6 +7,8 @@ import matplotlib
 import pytest
 from snippets import run
 
+import jaxgear as jg
+
 matplotlib.use("Agg")
 
 ROOT = Path(__file__).parents[1]
@@ -14,9 +16,17 @@ GUIDES = ROOT / "examples" / "guides"
 PAGES = [page for page in sorted(GUIDES.glob("*.md")) if "```python" in page.read_text("utf-8")]
 
 
+@pytest.fixture
+def searches_stay(monkeypatch):
+    """Searches end on the mesh of the page, not on one of 512 positions, as those of the README do in its test."""
+    for search in jg.minimize, jg.optimize.free_form:
+        monkeypatch.setitem(search.__kwdefaults__, "positions", None)
+
+
 @pytest.mark.slow
+@pytest.mark.usefixtures("room", "searches_stay", "clean_figures")
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
-def test_every_snippet_runs(page, tmp_path, monkeypatch, clean_figures):
+def test_every_snippet_runs(page, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert [*run(page)]
 

@@ -211,14 +211,15 @@ def test_a_narrow_body_bends_as_a_cantilever():
 @pytest.mark.slow
 def test_derivatives_by_angle_and_width_are_central_differences():
     def ripple(x):
-        mesh = jg.prepare(pair_of(x[0], x[1]), resolution=SIZES)
+        mesh = jg.prepare(pair_of(x[0], x[1]), resolution=replace(SIZES, slices=3))
         return jg.peak_to_peak(jg.solve(mesh, TORQUE, pinion=jg.LeadCrowning(5.0)).transmission_error)
 
     at, step = jnp.array([15.0, 20.0]), 1e-4
     steps = step * jnp.eye(2)
-    wanted = [(ripple(at + each) - ripple(at - each)) / (2 * step) for each in steps]
-    for mode in (jax.jacfwd, jax.jacrev):
-        np.testing.assert_allclose(jax.jit(mode(ripple))(at), wanted, rtol=1e-6, atol=1e-8)
+    back = jax.jit(jax.value_and_grad(ripple))  # one program for the values too
+    wanted = [(back(at + each)[0] - back(at - each)[0]) / (2 * step) for each in steps]
+    for found in (back(at)[1], jax.jit(jax.jacfwd(ripple))(at)):
+        np.testing.assert_allclose(found, wanted, rtol=1e-6, atol=1e-8)
 
 
 @pytest.mark.slow
@@ -230,8 +231,9 @@ def test_flanks_are_found_by_gradients():
         mesh=mesh,
         torque=TORQUE,
     )
-    finer = jg.solve(jg.prepare(mesh.pair, resolution=replace(SIZES, positions=512)), TORQUE)
-    assert float(found.objective) < 0.5 * float(jg.peak_to_peak(finer.transmission_error))
+    none = jg.TipRelief(0.0, 5.0)
+    unmodified = jg.solve(found.mesh, TORQUE, pinion=none, wheel=none)  # by the program that solved the optimum
+    assert found.positions >= 512 and found.objective < 0.5 * float(np.ptp(unmodified.transmission_error))
 
 
 def test_gears_must_have_opposite_hands():

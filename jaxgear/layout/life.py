@@ -258,7 +258,8 @@ def longest_life(
             f"{reason(unmodified.status)}: do the loads leave a shaft loose in its clearances?"
         )
     worst = int(np.argmax(np.sum(unmodified.pitting, axis=0)))
-    start = level_load(support, load.torques[worst], negative_crowning=negative_crowning, stations=stations)
+    heaviest = jax.tree.map(lambda leaf: leaf[worst], faces)
+    start = level_load(heaviest, negative_crowning=negative_crowning, stations=stations)
     point = np.array([float(start.slope), float(start.crowning)])
     bounds = [(None, None), (None if negative_crowning else 0.0, None)]
     for sharpness in _SHARPNESS:

@@ -61,7 +61,7 @@ def optimum_of(
         grid_change=grid_change,
         optimality=left,
         active_bounds=_active_bounds(problem.names, record.point),
-        constraints=_limits(problem, x),
+        constraints=_limits(problem, x, pinion, wheel),
         violation=max(record.violation - FEASIBLE, 0.0),  # as an excess is counted from inside a limit
         evaluations=record.evaluations,
         history=sign * np.asarray([value for _, value, _ in record.history]),
@@ -98,20 +98,29 @@ def judged(
 
     They are joined by its measure over its cases; infinite where a contact solution failed. No penalty is added.
     """
-    cases = problem.cases
-    if cases.count == 1 and cases.removed is None:  # the program that solves the one case serves every modification
-        speed = None if cases.speed is None else np.asarray(cases.speed)[0]
-        cycle = solve_case(
-            problem.mesh, OperatingPoint(np.asarray(cases.torque)[0], speed, cases.friction), pinion, wheel
-        )
-        mesh: Mesh | None = problem.mesh
-        if all(of.local for of in problem.objectives):  # they know nothing of the flanks but what is removed
-            cycle, mesh = replace(cycle, pinion=None, wheel=None), None
+    if _is_single(problem):
+        cycle, mesh = _single(problem, problem.objectives, pinion, wheel)
         values = np.asarray(_of_one(problem.objectives, cycle, mesh, problem.settings))
     else:
         values = np.asarray(_score_of(problem, pinion, wheel).value)
     names = (f"{over_cases(problem)}{of.named}" for of in problem.objectives)
     return {name: of.sign * float(value) for name, of, value in zip(names, problem.objectives, values)}
+
+
+def _is_single(problem: Problem) -> bool:
+    """Whether the program that solves one case serves every modification."""
+    return problem.cases.count == 1 and problem.cases.removed is None
+
+
+def _single(problem: Problem, quantities, pinion, wheel) -> tuple[MeshCycle, Mesh | None]:
+    """The solution of the only case, and the mesh if any of the quantities asks for it."""
+    cases, mesh = problem.cases, problem.mesh
+    speed = None if cases.speed is None else np.asarray(cases.speed)[0]
+    point = OperatingPoint(np.asarray(cases.torque)[0], speed, cases.friction)
+    cycle = solve_case(mesh, point, pinion, wheel)
+    if all(of.local for of in quantities):  # they know nothing of the flanks but what is removed
+        return replace(cycle, pinion=None, wheel=None), None
+    return cycle, mesh
 
 
 def over_cases(problem: Problem) -> str:
@@ -131,11 +140,11 @@ def _score_of(problem: Problem, pinion, wheel):
     return problem.score_of(pinion, wheel)
 
 
-def _limits(problem: Problem, x) -> dict[str, Limit]:
+def _limits(problem: Problem, x, pinion, wheel) -> dict[str, Limit]:
     if not problem.constraints:
         return {}
     named: dict[str, Limit] = {}
-    for constraint, values in zip(problem.constraints, _constrained(problem, x)):
+    for constraint, values in zip(problem.constraints, _constrained(problem, x, pinion, wheel)):
         worst = max(np.asarray(values), key=lambda value: _excess(constraint, value))
         name, repeated = constraint.name, 2
         while name in named:
@@ -149,19 +158,31 @@ def _excess(constraint: Constraint, value) -> float:
     return float(max(constraint.excess(jnp.asarray(value))))
 
 
-def _constrained(problem: Problem, x) -> Sequence[np.ndarray]:
+def _constrained(problem: Problem, x, pinion, wheel) -> Sequence[np.ndarray]:
     """Values of every constraint, cases leading."""
     parameters = problem.parameters(x)
-    of_cycle = iter(_numbers(problem, x) if any(limit.quantity for limit in problem.constraints) else ())
+    wanted = tuple(limit.quantity for limit in problem.constraints if limit.quantity is not None)
+    of_cycle = iter(_numbers(problem, wanted, x, pinion, wheel) if wanted else ())
     return [
         np.atleast_1d(limit.of_parameters(parameters) if limit.quantity is None else next(of_cycle))
         for limit in problem.constraints
     ]
 
 
+def _numbers(problem: Problem, wanted, x, pinion, wheel):
+    if not _is_single(problem):
+        return _over_cases(problem, wanted, x)
+    return _at_single(wanted, *_single(problem, wanted, pinion, wheel), problem.settings)
+
+
 @program
-def _numbers(problem: Problem, x):
-    wanted = [limit.quantity for limit in problem.constraints if limit.quantity is not None]
+def _at_single(wanted, cycle, mesh, settings):
+    analysis = Analysis(cycle, mesh, settings)
+    return [of(analysis) for of in wanted]
+
+
+@program
+def _over_cases(problem: Problem, wanted, x):
     return problem.over_cases(x, lambda analysis: [of(analysis) for of in wanted])
 
 

@@ -155,19 +155,26 @@ def annex_e(
     check("annex_e", "stiffness", stiffness, "N/(mm um)", low=0.0, open_low=True)
     modified = NoModification() if pinion is None else pinion, NoModification() if wheel is None else wheel
     optional = None if torque is None else real(torque), None if stiffness is None else real(stiffness)
-    return _annex_e(support, *modified, *optional, whole("annex_e", "stations", stations, 2, 1001))
+    removed = _removed(support.pair, *modified, whole("annex_e", "stations", stations, 2, 1001))
+    return _annex_e(support, removed, *optional)
+
+
+@program
+def _removed(pair: GearPair, pinion: AbstractModification, wheel: AbstractModification, stations: int) -> Slices:
+    """By both flanks [um]; apart from the load, whose longer program then serves modifications of any kind."""
+    y = even_coordinates(pair.face_width, stations)
+    amount = sum(item(flank) for item, flank in zip((pinion, wheel), pitch_lines(pair, y)))
+    return jnp.broadcast_to(amount, y.shape)
 
 
 @program
 def _annex_e(
     support: AbstractSupport,
-    pinion: AbstractModification,
-    wheel: AbstractModification,
+    removed: Slices,
     torque: Scalar | None,
     stiffness: Scalar | None,
-    stations: int,
 ) -> FaceLoad:
-    pair = support.pair
+    pair, stations = support.pair, len(removed)
     moment = support.torque if torque is None else torque
     assert moment is not None  # one of both is given
     width = pair.face_width
@@ -177,8 +184,7 @@ def _annex_e(
         some = jnp.where(moment > 0, moment, 1.0)
         stiffness = mesh_stiffness(pair, 1e3 * some / (pair.pinion.pitch_radius * width))
     influence = support.influence(y)
-    gap = support.gap(y) + sum(item(flank) for item, flank in zip((pinion, wheel), pitch_lines(pair, y)))
-    gap = jnp.broadcast_to(gap, y.shape)
+    gap = jnp.broadcast_to(support.gap(y) + removed, y.shape)
     found = press(influence + jnp.eye(stations) / (stiffness * step), gap, 1e3 * moment / pair.pinion.base_radius)
     causes = {Status.NOT_CONVERGED: ~found.converged, Status.OUT_OF_VALIDITY: ~(stiffness > 0)}
     status = status_of(causes, support.status)
