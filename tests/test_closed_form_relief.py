@@ -176,6 +176,7 @@ def test_gradient_of_the_closed_forms(mesh):
     np.testing.assert_allclose(slope(best + 0.1, 1.0), (half, -0.5), rtol=1e-9)
 
 
+@pytest.mark.slow
 def test_two_and_three_pairs_in_contact():
     """Contact ratio 2.36: the deflection varies between a half and a third of delta0."""
     pair = high_contact_ratio_pair()

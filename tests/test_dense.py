@@ -142,7 +142,10 @@ def test_traced_code_has_no_other_equations():
     assert {name: found for name, text in texts.items() if (found := calls.findall(text))} == {}
 
 
-@pytest.mark.parametrize("designs", [pytest.param(over_meshes, marks=pytest.mark.slow), over_lines, over_tables])
+SLOW = (pytest.param(each, marks=pytest.mark.slow) for each in (over_meshes, over_lines))
+
+
+@pytest.mark.parametrize("designs", [*SLOW, over_tables])
 def test_a_sweep_calls_no_lapack(designs):
     """Its calls of many designs at once would wait for each other's threads (see `jaxgear.numerics.dense`)."""
     program = jax.jit(jax.vmap(designs)).lower(jnp.linspace(1.0, 1.1, 3)).as_text()

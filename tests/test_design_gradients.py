@@ -83,6 +83,7 @@ def compare(exact, difference):
     assert np.all(np.abs(exact[1]) > 1e-6), "an input without effect on the mean would agree with anything"
 
 
+@pytest.mark.slow
 def test_modifications_and_torque():
     with jax.numpy_rank_promotion("allow"), jax.numpy_dtype_promotion("standard"):
         sizes = jg.Resolution(positions=16, slices=3, pairs=2, face_modes=2, slide_steps=0)

@@ -211,6 +211,7 @@ def dead_zone(load, stiffness=(), amount=0.0, **given):
     return with_relief(model, relief(amount, begin=-0.185))
 
 
+@pytest.mark.slow
 def test_dead_zone_without_stiffness_variation_is_the_linear_oscillator():
     """Out of the clearance: the amplitude of x is F_ah w^2 / |1 - w^2 + 2 i zeta w| (Kahraman, Singh 1990)."""
     model = dead_zone(0.1, displacement=0.05)

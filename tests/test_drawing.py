@@ -153,6 +153,7 @@ def secant(law):
     return np.asarray(_secant(law))
 
 
+@pytest.mark.slow
 def test_the_corner_of_a_chamfer_is_stiffer_than_that_of_a_cut_tip():
     cut, _ = corner_law(62.4, None)
     chamfered, load = corner_law(63.0, 62.4)

@@ -105,6 +105,7 @@ def nearby(mesh):
     return several, way
 
 
+@pytest.mark.slow
 def test_slopes_along_a_change_of_what_vibrates_are_those_of_differences(mesh, nearby):
     """Of the mesh force by the relief, at every speed of every run."""
     several, way = nearby
@@ -151,6 +152,7 @@ def test_an_objective_is_the_number_of_the_sweep(mesh):
     assert np.abs(slopes).min() > 8e-2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("of_contacts", [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_many_designs_are_each_as_alone(mesh, of_contacts):
     """Batches of two, the last one filled up; the contacts of one design count as not found."""
@@ -274,6 +276,7 @@ def test_no_kick_saves_a_run():
     assert dataclasses.replace(SETTINGS, kick=3.0).run_names == ("up", "down", "down, kicked")
 
 
+@pytest.mark.slow
 def test_kicks_without_a_size_find_two_cycles_of_a_relieved_pair(mesh):
     """Which kicks of 2.5 meet, and one of 3.1 does not."""
     settings = dataclasses.replace(SETTINGS, mesh_frequencies=[5000.0, 5200.0], damping_ratio=0.03, kick=None)

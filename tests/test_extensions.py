@@ -118,6 +118,7 @@ class Table(AbstractCompliance):
         return Spring(jnp.broadcast_to(self.contact, geometry.face_width.shape))
 
 
+@pytest.mark.slow
 def test_a_tabulated_compliance_needs_nothing_of_the_package():
     """At the pitch point one pair bears the load: TE = F / b (tooth + tooth + contact), with slopes by each."""
     pair = gear_pair()

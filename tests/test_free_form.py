@@ -66,6 +66,7 @@ def curvature(mesh, result):
     return np.abs(np.diff(tables(result), 2, axis=1) / steps[:, None] ** 2).max()
 
 
+@pytest.mark.slow
 def test_beats_the_best_named_curve(mesh, named, optimum):
     assert optimum.method == "free_form"
     assert optimum.ppte < 0.7 * named.ppte

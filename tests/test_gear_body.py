@@ -92,6 +92,7 @@ def test_reciprocity():
     assert np.linalg.eigvalsh(arc(0.09, 2.5, [0.0], 400)[0]).min() > 0
 
 
+@pytest.mark.slow
 def test_convergence_with_harmonics():
     """The error of the moment term falls with the square of the number of harmonics."""
     values = [arc(0.1, 3.0, [0.0], n)[0][M, M] for n in (100, 200, 400, 3200)]

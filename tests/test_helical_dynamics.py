@@ -55,6 +55,7 @@ def test_a_load_has_the_transmission_error_of_the_contact_analysis():
         np.testing.assert_allclose(found, cycle.transmission_error, rtol=5e-3)
 
 
+@pytest.mark.slow
 def test_a_small_angle_has_the_springs_of_spur_gears():
     """Of both flanks."""
     spur, nearly, small = (

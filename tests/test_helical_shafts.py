@@ -121,6 +121,7 @@ def test_the_axial_force_bends_the_shaft_by_its_moment():
     assert np.abs(found - 1e3 * (over(force) + shear + stretch + twist)).max() > 0.02 * found.max()
 
 
+@pytest.mark.slow
 def test_mirrored_gearboxes_turn_their_influence_round():
     """About a plane across the shafts face coordinates change sign, about one along them the sense of rotation."""
     right, left = pair_of(BETA, 18.0), pair_of(-BETA, 18.0)

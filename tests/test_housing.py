@@ -92,6 +92,7 @@ def test_maxwell_reciprocity_through_the_housing(housed):
     assert abs(found[0, 1]) > 1e-6
 
 
+@pytest.mark.slow
 def test_factor_follows_housing_entries(housed):
     """Derivative of K_Hbeta by entries of the stiffness matrix, both of a symmetric pair."""
 

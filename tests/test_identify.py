@@ -7,7 +7,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from catalogue import FACE, SLIDING, gear_pair
+from catalogue import FACE, LINE, SLIDING, gear_pair
 
 import jaxgear as jg
 from jaxgear.conditions import solve_case
@@ -45,6 +45,22 @@ def readings(torques, scale=1.005):
 def found(torques, **options):
     data = Measurement(*readings(torques), noise=NOISE)
     return identify(design, PRIOR, data, mesh=mesh(), offset=10.0, **options)
+
+
+def test_a_relief_and_an_offset_are_found_where_the_model_itself_made_the_data():
+    meshed = jg.prepare(gear_pair(), resolution=LINE)
+
+    def relief(unknown):
+        return jg.TipRelief(unknown["pinion"], 4.0), jg.NoModification()
+
+    true = solve_case(meshed, jnp.asarray(TORQUES[1]), *relief({"pinion": jnp.asarray(9.0)})).transmission_error
+    data = Measurement(meshed.phase, np.full(16, TORQUES[1]), true + OFFSET, noise=1e-6)
+    result = identify(
+        relief, {"pinion": PRIOR["pinion"]}, data, mesh=meshed, torque_scale=None, offset=10.0, model_error=0.0
+    )
+    assert result.converged and result.names == ("pinion", "offset") and not result.not_told()
+    np.testing.assert_allclose(result.estimate, [9.0, OFFSET], atol=1e-6)
+    assert np.all(result.deviation < 1e-4) and np.all(result.deviation < result.prior[1])
 
 
 @pytest.mark.slow

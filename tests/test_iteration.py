@@ -113,6 +113,7 @@ def test_the_largest_relief_is_kept_in_every_state(mesh, nominal):
     assert result.ppte < capped.ppte < 0.75 * capped.iterations[0].ppte
 
 
+@pytest.mark.slow
 def test_a_relief_to_start_from_also_softens_the_entry(nominal, relieved):
     """From a gradual relief the level is reached as well, and the tips no longer come in as sharp edges."""
     result, _ = nominal
@@ -170,6 +171,7 @@ def test_the_limit_of_the_pressure_is_kept_between_the_positions(mesh):
     assert short.feasible and largest(short) > limit
 
 
+@pytest.mark.slow
 def test_a_limit_of_the_pressure_that_holds_anyway_changes_nothing(nominal, mesh):
     result, _ = nominal
     free = jg.optimize.iterate_transmission_error(mesh, TORQUE, max_pressure=1e5)

@@ -503,6 +503,7 @@ def test_life_is_differentiable_beside_idle_loads():
     np.testing.assert_allclose(life(at, faces)[1], slope, rtol=1e-6)
 
 
+@pytest.mark.slow
 def test_longest_life_beats_its_neighbours_and_every_single_layout(bent):
     line = longest_life(bent, DUTY, STRENGTH, stations=STATIONS)
     faces = under_loads(bent, DUTY.torques, STATIONS)

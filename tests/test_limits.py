@@ -38,6 +38,7 @@ def one_program(monkeypatch):
     monkeypatch.setattr(verdict, "Linearizer", lambda problem, _: Linearizer(problem, refine._NEAR + refine._FAR))
 
 
+@pytest.mark.slow
 def test_a_search_that_meets_no_feasible_design_seeks_one(one_program):
     """Few random designs all miss a narrow band, which the violation alone leads to; nothing leads to no design."""
     mesh = jg.prepare(gear_pair(), resolution=LINE)

@@ -76,6 +76,7 @@ def test_slopes_of_the_transmission_error(mesh):
         np.testing.assert_allclose(np.asarray(pieces.slope[case]) @ WAY, expected, atol=2e-4 * np.abs(expected).max())
 
 
+@pytest.mark.slow
 def test_every_extreme_has_its_pieces(mesh):
     """Objectives and limits of one's own, pressures and lines: every value with its slope, by the cheapest way.
 

@@ -140,6 +140,7 @@ def test_gradients_go_through_the_first_solution(mesh, batch):
     np.testing.assert_allclose(backward, batch[1][:2] @ weights, rtol=1e-9)
 
 
+@pytest.mark.slow
 def test_batches_are_their_members(batch, cycle):
     whole, _, unmodified = batch[0]
     np.testing.assert_allclose(whole, cycle.transmission_error, rtol=1e-9)

@@ -108,6 +108,7 @@ def structure_and_hub(compliance, mesh):
     return jnp.sum(compliance.structure(*loads), axis=0), jnp.sum(compliance.hub(*loads))
 
 
+@pytest.mark.slow
 @CASES
 def test_hub_windup_shifts_the_mean_and_nothing_else(name, solved):
     case, cycle = solved[name]

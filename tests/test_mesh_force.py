@@ -96,6 +96,7 @@ def random_dtes(random):
     return random.uniform(-5.0, 16.0, 80)
 
 
+@pytest.mark.slow
 def test_a_load_has_the_transmission_error_of_the_contact_analysis(case, mesh, static_force):
     given, force = case
     removed = removed_material(mesh, TORQUE, **given)

@@ -79,6 +79,7 @@ def check_of_parameters(mesh, torque, result, box):
         assert result.active_bounds.get(name) == at
 
 
+@pytest.mark.slow
 def test_result_belongs_to_its_parameters(known, best):
     check_of_parameters(known.mesh, known.torque, best, TALL)
 

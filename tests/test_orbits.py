@@ -67,6 +67,7 @@ def test_contact_is_lost_for_the_share_of_time_that_the_approach_is_negative():
     assert at(1.2, ([1.3], [0.9])).contact_loss_share == 0
 
 
+@pytest.mark.slow
 def test_peaks_do_not_depend_on_the_steps():
     """The largest force lies between samples: parabolas find it, and its derivative does not jump with the samples."""
     coarse = [at(0.9 + 1e-4 * i, NEAR, steps=FEW).dynamic_factor for i in range(3)]

@@ -151,6 +151,7 @@ def test_bearings_carry_the_mesh_force():
     np.testing.assert_allclose(found.state[0][0], expected, atol=1e-6)
 
 
+@pytest.mark.slow
 def test_a_bearing_force_is_what_the_centre_of_a_gear_does_not_take_to_accelerate():
     """Newton's law over the cycle, m dv = integral of (mesh force - bearing force) dt, and their means are equal."""
     stiffness = np.array([np.diag([500.0, 100.0]), np.diag([250.0, 100.0])])

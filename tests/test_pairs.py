@@ -109,6 +109,7 @@ def expected_too_high(mesh, wide, removed):
     return (expected_between(mesh, removed) - true).max()
 
 
+@pytest.mark.slow
 def test_no_pair_beyond_touches_before_it_is_expected(mesh):
     """Their gaps never close earlier, but for the curvature of the removed material within one contact."""
     still = jg.prepare(gear_pair(), resolution=jg.Resolution(positions=16, pairs=4, slide_steps=0))

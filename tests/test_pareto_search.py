@@ -34,6 +34,7 @@ def dominated(values):
     return worse.any(axis=1)
 
 
+@pytest.mark.slow
 def test_no_design_beats_another(searched):
     front = searched
     assert front.objectives == VOLUME

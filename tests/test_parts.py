@@ -119,6 +119,7 @@ def whole(fine):
     return Linearizer(problem_on(fine), 1)(POINT)[0]
 
 
+@pytest.mark.slow
 def test_a_problem_is_linearized_on_the_parts(fine, coarse, whole):
     by_parts = coarse.on(problem_on(fine))(POINT)[0]
     assert bool(by_parts.fine)

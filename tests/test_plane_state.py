@@ -192,6 +192,7 @@ def own_compliance(gear, roll_length, width):
     return planes[0] + share * (planes[1] - planes[0]) + ring.hub(load.outline)
 
 
+@pytest.mark.slow
 def test_model_against_three_dimensional_finite_elements():
     """The whole error of beam and ring: nearly all of it is that of their two-dimensional problem."""
     errors = {}

@@ -52,6 +52,7 @@ def test_pairs_share_the_force_at_the_approach_of_teeth_and_bodies_together(mesh
     assert np.any((found.pair_force > 0).sum(axis=0) > 1)
 
 
+@pytest.mark.slow
 def test_slope_of_the_force_is_the_tangent_stiffness(mesh, cycle, error_of_teeth):
     """That of the teeth; in series with the bodies it is the cycle's."""
     slope = jax.jit(jax.grad(lambda error: jnp.sum(contact(mesh, error).force)))(error_of_teeth)

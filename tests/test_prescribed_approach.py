@@ -26,6 +26,7 @@ def pressed(loaded):
     return solve(at_approach(DATA, loaded.approach))
 
 
+@pytest.mark.slow
 def test_the_approach_under_a_load_brings_the_load_back(loaded, pressed):
     assert bool(jnp.all(loaded.converged)) and bool(jnp.all(pressed.converged))
     np.testing.assert_allclose(pressed.load, 400.0, rtol=1e-9)
@@ -60,6 +61,7 @@ def test_slope_of_the_load_is_the_tangent_stiffness_and_the_curvature_that_of_di
     np.testing.assert_allclose(curvature, difference, rtol=1e-5, atol=1e-5)
 
 
+@pytest.mark.slow
 def test_derivatives_by_the_gaps_follow_from_those_under_load(loaded):
     """At fixed load dd/dg; at fixed approach dF/dg = -k dd/dg, for every gap."""
 

@@ -145,6 +145,7 @@ def test_the_derivative_of_the_rest_on_bearings_is_that_of_the_equilibrium(held)
     assert float(jax.jit(jax.grad(centre))(40.0)) == pytest.approx(-lever / 200.0, rel=1e-9)
 
 
+@pytest.mark.slow
 def test_mean_force_of_a_vibration_on_bearings_is_the_static_one(held):
     """Whatever the speed: the torque has to be carried. Beside the two jumps the mean of a step's ends is exact."""
     frequency, rest = jnp.asarray(5800.0), resting(held, HERE).coordinates
@@ -156,6 +157,7 @@ def test_mean_force_of_a_vibration_on_bearings_is_the_static_one(held):
     assert np.trapezoid(force, phase) == pytest.approx(float(held.load[0]), rel=5e-4)
 
 
+@pytest.mark.slow
 def test_slow_motion_passes_through_the_equilibria(sprung):
     """Approach of every mesh position at rest, and K_v is the largest force at rest over the mean one."""
     found = speed_sweep(sprung, [1e-3], steps=4096)

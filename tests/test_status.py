@@ -27,6 +27,7 @@ def test_every_cause_has_a_text_of_its_own():
     assert len(set(texts)) == len(texts) and all("\n" not in text for text in texts)
 
 
+@pytest.mark.slow
 def test_a_batch_has_a_status_of_every_member_and_derivatives_pass_it():
     """A load beyond the pairs of the mesh, beside one within them."""
     mesh = jg.prepare(gear_pair(), resolution=LINE)

@@ -99,6 +99,7 @@ def test_one_pair_of_constant_stiffness_is_the_one_dimensional_analysis(crowning
     assert (load[0].min() == 0) == (crowning > 20)
 
 
+@pytest.mark.slow
 def test_teeth_that_pass_their_load_on_raise_the_factor_of_the_one_dimensional_analysis(carried):
     """A load gives way less the shorter it is; one stiffness along the face does not know. 5 to 25 % here."""
     given = support(gearbox(), 0)

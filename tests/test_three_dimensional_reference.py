@@ -47,6 +47,7 @@ def coarse():
     return both
 
 
+@pytest.mark.slow
 def test_few_slices_show_slope_and_crowning(coarse):
     for name, (made, true) in coarse.items():
         assert 100 * abs(made.factor / true.factor - 1) <= FACTOR["crown"]["b18"], name

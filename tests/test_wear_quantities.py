@@ -36,6 +36,7 @@ def mesh():
     return prepare(gear_pair((20, 30), face_width=20.0, bores=(None, None)), resolution=LINE)
 
 
+@pytest.mark.slow
 def test_quantities_are_those_of_the_life(mesh):
     relief = jg.TipRelief(5.0, 2.0)
     cycle = solve_case(mesh, TORQUE, relief, relief)
