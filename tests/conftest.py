@@ -166,13 +166,16 @@ MOST_MEMORY = 3 << 30, 5 << 30  # bytes
 def _forget_compiled_programs():
     """Drops what files of tests compiled once it is much: the system refuses a process that holds too many programs."""
     yield
-    if _holds_much():
-        _forget()
+    _make_room()
 
 
 @pytest.fixture
 def room():
     """For tests that compile as much as other files do: what was compiled before them goes once it is much."""
+    _make_room()
+
+
+def _make_room():
     if _holds_much():
         _forget()
 
