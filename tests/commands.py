@@ -18,7 +18,7 @@ title = "a [small] pair"
 [pinion]
 teeth = 19
 module = 3.0
-face_width = 20.0
+face_width = 18.0
 [wheel]
 teeth = 48
 module = 3.0

@@ -156,10 +156,10 @@ mlir.make_ir_context = _Context()
 
 # Each compiled program holds some 20 mappings of memory, of which Linux grants a process 65530, and memory, of which
 # all workers, a browser and the processes of a test have to share what a machine has. A worker may hold the smaller
-# size on any machine, and up to the larger one as long as all of them hold no more than a third of it; what one file
-# adds, less than 2 GiB, comes on top.
+# size on any machine, and up to the larger one, with which two workers trace nothing twice, as long as all of them hold
+# no more than a half of it; what one file adds, less than 2 GiB, comes on top.
 MOST_MAPPINGS = 50_000
-MOST_MEMORY = 3 << 30, 5 << 30  # bytes
+MOST_MEMORY = 3 << 30, 7 << 30  # bytes
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -189,7 +189,7 @@ def _holds_much() -> bool:
     except OSError:
         return True
     page, (least, most) = os.sysconf("SC_PAGE_SIZE"), MOST_MEMORY
-    share = os.sysconf("SC_PHYS_PAGES") * page // (3 * int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", 1)))
+    share = os.sysconf("SC_PHYS_PAGES") * page // (2 * int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", 1)))
     return mappings > MOST_MAPPINGS or pages * page > min(max(least, share), most)
 
 

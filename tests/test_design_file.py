@@ -959,7 +959,7 @@ def test_summaries_hold_no_nan(tmp_path):
 
 
 def test_flank_rows_run_from_the_start_of_the_active_profile_to_the_tip(load):
-    mesh = load(text(tail=f"[resolution]\n{LINE}")).mesh()
+    mesh = load(text(tail=f"[resolution]\n{LINE}").replace("20.0", "18.0")).mesh()
     relief = jg.TipRelief(7.0, 3.0)
     rows = list(flank_rows(mesh, {"a": (relief, jg.NoModification()), "b": (relief + jg.LeadCrowning(2.0), relief)}))
 
