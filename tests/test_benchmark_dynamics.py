@@ -80,6 +80,7 @@ def test_scipy_has_the_force_of_the_map(moving):
         assert solver.force(phase, q) == pytest.approx(expected, rel=1e-12, abs=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(find_compiler() is None, reason="no C compiler")
 def test_c_has_the_steady_states_of_the_sweep(moving, swept):
     kernel = CSweep(vibration_of(moving), STEPS)

@@ -59,6 +59,7 @@ def branch():
     return follow_orbits(held(POINT), start, within=(frequency(2.3), frequency(2.9)), step=0.05, steps=STEPS)
 
 
+@pytest.mark.slow
 def test_a_pair_of_multipliers_leaves_and_enters_the_circle_about_the_sum_of_both_frequencies(branch):
     assert branch.ended == "range" and (np.asarray(branch.orbits.contact_loss_share) == 0).all()
     assert [found.kind for found in branch.bifurcations] == ["Neimark-Sacker"] * 2

@@ -63,6 +63,7 @@ def measured(batch):
     return jax.tree.map(np.asarray, (together, alone))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", METRICS)
 def test_a_metric_of_many_cycles_is_that_of_each(measured, name):
     """Whether it is taken of the batch or of every cycle, over two batch axes."""

@@ -375,6 +375,22 @@ def test_what_cannot_be_optimized_is_refused():
         dynamic_profile_modification(model, 0.9, relief(curve=Parabolic()), free=("curve",))
 
 
+def test_a_short_search_is_no_worse_than_what_it_starts_from(monkeypatch):
+    """Two generations: the dynamic optimum vibrates least, and the static one has the least static amplitude."""
+    monkeypatch.setattr(optimum, "_FINER", 1)
+    model, condition = model_of(PolynomialClearance.published(), displacement=0.05), operating_conditions()[0]
+    given = relief(0.2, curve=condition.curve, begin=-0.185)
+    options = {"free": condition.free, "iterations": 2, "method": "genetic"}
+    found = dynamic_profile_modification(model, condition.frequency, given, bounds={"curve": (1.0, 2.0)}, **options)
+    none, static, dynamic = found.amplitude
+    assert found.converged.all() and 0 < dynamic <= static < none
+    assert found.static_amplitude[1] == found.static_amplitude.min() < 0.5 * found.static_amplitude[0]
+    for each in (found.static, found.dynamic):
+        assert 0 < each.amount <= 4 * model.load and 1.0 <= each.curve.exponent <= 2.0
+    row = modification_table([(condition, found)]).splitlines()[1].split()
+    assert row[:3] == ["primary", "1.000", "amount+curve"] and float(row[5]) == pytest.approx(float(dynamic), abs=5e-6)
+
+
 @pytest.mark.slow
 def test_the_genetic_algorithm_finds_the_optimum_without_gradients():
     model = model_of(PolynomialClearance.published(), displacement=0.05)

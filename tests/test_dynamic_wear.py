@@ -80,6 +80,7 @@ def resonant(mesh, natural):
     return life_of(mesh, natural)
 
 
+@pytest.mark.slow
 def test_slow_gears_have_the_static_force(mesh, natural):
     """But for the vibration after every step of the stiffness."""
     _, motion = motion_at(mesh, natural / 40)
@@ -97,6 +98,7 @@ def test_slow_gears_wear_as_under_the_static_load(mesh, natural):
     assert 1.0 < float(slow.dynamic_factor[0]) < 1.1
 
 
+@pytest.mark.slow
 def test_far_above_the_resonance_the_approach_stands_still(mesh, natural):
     oscillator, motion = motion_at(mesh, 12 * natural)
     force = jax.jit(jax.vmap(oscillator.mesh_force, in_axes=(0, None)))

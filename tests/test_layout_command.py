@@ -377,6 +377,7 @@ def test_the_bearing_span_of_a_drawing_matters(file):
     assert float(parallel.tolerances["maximum"].misalignment) == 0.0
 
 
+@pytest.mark.slow
 def test_an_analysis_stands_on_the_shafts_of_the_file(file, monkeypatch):
     """What they do holds at every torque: the mesh of the file is that of its gearbox, at any."""
     design = load_design(file(FILE))

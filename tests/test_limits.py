@@ -97,6 +97,7 @@ def test_a_mesh_is_fine_enough_for_all_designs_or_for_none():
     assert fine_enough(values, np.array([0.0, 0.5]), values, np.array([0.0, 0.6])), "a limit that is passed anyway"
 
 
+@pytest.mark.slow
 def test_limits_beside_an_objective_that_is_no_extreme_are_judged_at_four_times_the_positions():
     """Its programs know no mesh half a position later; the largest pressure lies between twice the positions."""
     few = replace(LINE, positions=8)

@@ -141,6 +141,7 @@ def test_a_mesh_without_hub_windup_has_no_hub_and_the_same_structure(name, solve
     np.testing.assert_allclose(cycle.pair_force, rigid.pair_force, rtol=1e-11, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_slices_without_lead_modification_are_all_alike(sliced):
     one, many = solve(prepare(gear_pair(), resolution=FOUR_PAIRS), 50.0), solve(sliced, 50.0)
     error, load = np.asarray(one.transmission_error), np.asarray(one.line_load)

@@ -48,7 +48,10 @@ def test_parts_together_are_the_mesh(fine):
             np.testing.assert_allclose(getattr(part, name), expected, rtol=1e-9, atol=1e-9, err_msg=name)
 
 
-@pytest.mark.parametrize("helix_angle, wider", [(None, 4.0), (15.0, 0.0)], ids=["wider", "helical"])
+@pytest.mark.parametrize(
+    "helix_angle, wider",
+    [pytest.param(None, 4.0, id="wider"), pytest.param(15.0, 0.0, id="helical", marks=pytest.mark.slow)],
+)
 def test_no_array_of_a_part_has_the_positions_of_the_whole(helix_angle, wider):
     first, second = (jg.Gear(teeth, 3.0, face_width=20.0, helix_angle=helix_angle) for teeth in (19, 48))
     other = None if helix_angle is None else -helix_angle

@@ -65,6 +65,7 @@ def test_the_share_is_smooth_down_to_no_width(dtype, precision):
         np.testing.assert_allclose(found, np.where(small, near, far), rtol=precision, atol=max(precision, 1e-8))
 
 
+@pytest.mark.slow
 def test_a_disc_is_in_plane_stress_and_a_wide_face_in_plane_strain(structures):
     found, strain, stress = structures
     np.testing.assert_allclose(found[0], stress, rtol=1e-7)
@@ -77,6 +78,7 @@ def test_a_disc_is_in_plane_stress_and_a_wide_face_in_plane_strain(structures):
     np.testing.assert_array_less(2 * min(chords) / WIDTHS[-1] - 1e-6, left[-1])
 
 
+@pytest.mark.slow
 def test_a_wider_face_is_stiffer_per_width(structures):
     found, strain, stress = structures
     own = np.einsum("wiip->wip", found)

@@ -35,6 +35,7 @@ def test_the_approach_under_a_load_brings_the_load_back(loaded, pressed):
     np.testing.assert_array_equal(pressed.in_contact, loaded.in_contact)
 
 
+@pytest.mark.slow
 def test_slope_of_the_load_is_the_tangent_stiffness_and_the_curvature_that_of_differences(pressed, loaded):
     def load(shift):
         return solve_contact(at_approach(DATA, loaded.approach + shift), steps=12).load

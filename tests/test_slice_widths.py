@@ -159,6 +159,7 @@ def assert_conditions(c, compliance, gap, lever, approach, load, own, opening):
 own_deflection = jax.jit(lambda law, load: law.secant(jnp.maximum(load, 1e-9)))
 
 
+@pytest.mark.slow
 def test_solution_meets_the_conditions_of_the_dense_problem():
     """Of rough flanks that touch on some of the slices only, on a support that gives way under the load."""
     mesh = mesh_of(support=Bent(pair_of(), Misalignment(direct=20.0)))

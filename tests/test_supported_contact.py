@@ -51,6 +51,7 @@ def rigid(mesh):
     return cycle
 
 
+@pytest.mark.slow
 def test_what_does_not_give_way_is_no_support(rigid, carried):
     stiff = gearbox(radial=1e12, modulus=1e14)
     assert_same(solved(support(stiff, 0)), rigid, rtol=1e-6)
@@ -71,6 +72,7 @@ def test_a_housing_of_no_compliance_is_none(carried):
     assert_same(solved(support(gearbox(housing=Housing(nodes, np.zeros((12, 12)), "compliance")), 0)), carried)
 
 
+@pytest.mark.slow
 def test_a_mirrored_gearbox_mirrors_the_load(carried):
     turned = solved(support(gearbox(mirrored=True), 0), pinion=jg.LeadSlope(-4.0) + jg.LeadCrowning(5.0))
     np.testing.assert_allclose(turned.transmission_error, carried.transmission_error, rtol=1e-8)
@@ -108,6 +110,7 @@ def test_teeth_that_pass_their_load_on_raise_the_factor_of_the_one_dimensional_a
     assert 1.05 < float(face_load_factor(carried)) / alone < 1.25
 
 
+@pytest.mark.slow
 def test_a_contact_on_shafts_that_cannot_be_does_not_converge(mesh):
     assert mesh.status == Status.CONVERGED
     refused = eqx.tree_at(lambda of: of.support_status, mesh, jnp.int8(Status.SUPPORT_NOT_POSSIBLE))

@@ -48,6 +48,7 @@ def verified(best, folder):
     return jg.optimize.verify(best, cache=folder)
 
 
+@pytest.mark.slow
 def test_both_numbers_are_those_of_the_two_structures(best, verified, flat, tabulated):
     flanks = best.pinion, best.wheel
     assert verified.claimed == pytest.approx(ppte(flat, 50.0, *flanks), rel=1e-9)
@@ -57,6 +58,7 @@ def test_both_numbers_are_those_of_the_two_structures(best, verified, flat, tabu
     assert 1e-3 < abs(verified.ppte - verified.claimed) < 0.1
 
 
+@pytest.mark.slow
 def test_the_measure_is_that_of_the_search(best, verified, flat, tabulated):
     for mesh, found in ((flat, verified.claimed_objectives), (tabulated, verified.objectives)):
         worst = max(ppte(mesh, torque, best.pinion, best.wheel) for torque in TORQUES)
@@ -65,6 +67,7 @@ def test_the_measure_is_that_of_the_search(best, verified, flat, tabulated):
     assert re.search(rf"^worst ppte \[um\] .*{best.objective:.4g} .* {worst:.4g}$", str(verified), re.MULTILINE)
 
 
+@pytest.mark.slow
 def test_flanks_without_an_objective_are_verified_too(best, verified, folder):
     found = jg.optimize.verify(replace(best, problem=None), cache=folder)
     assert found.objectives == found.claimed_objectives == {}
@@ -89,6 +92,7 @@ def test_a_contact_law_of_another_kind_is_verified_too(best, tabulated, folder):
     assert verified.ppte == pytest.approx(ppte(tabulated, 50.0, best.pinion, best.wheel), rel=1e-9)
 
 
+@pytest.mark.slow
 def test_a_failed_solution_is_no_number(best, flat, folder):
     """Far more torque than two pairs can take."""
     second = jg.optimize.verification(flat, jg.optimize.structure_for(flat, cache=folder))
@@ -107,6 +111,7 @@ def test_free_flanks_on_the_finite_element_structure(tabulated):
         jg.optimize.verify(free)
 
 
+@pytest.mark.slow
 def test_claims_beyond_a_model_are_findings(best, flat, tabulated):
     """Each structure has its own limit, the second opinion is named, and rough designs are believed."""
     of_default = {claim: finding_of_claim(claim, flat.compliance, 0.0712) for claim in (0.11, 0.05, 0.02)}
@@ -119,6 +124,7 @@ def test_claims_beyond_a_model_are_findings(best, flat, tabulated):
     assert "PPTE 0.02 um is less than 0.1 um" in str(level) and "warning" not in str(best)
 
 
+@pytest.mark.slow
 def test_an_unmodified_pair_claims_nothing(flat):
     """Little load makes little transmission error, and that to a few per cent."""
     light = jg.solve(flat, 0.5)

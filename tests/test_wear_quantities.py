@@ -61,6 +61,7 @@ def test_quantities_are_those_of_the_life(mesh):
         np.testing.assert_allclose(number_of(name, life, SETTINGS), number, rtol=1e-12)
 
 
+@pytest.mark.slow
 def test_the_pressure_of_worn_flanks_has_an_error_of_its_own(mesh):
     """Wear leaves a ridge at the pitch point, which points blunt; the blocks say nothing of it."""
     life = SETTINGS.history(mesh, TORQUE, pinion=NONE, wheel=NONE, deviation=PERFECT)
