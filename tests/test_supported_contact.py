@@ -15,6 +15,8 @@ from jaxgear.contact.status import Status
 from jaxgear.metrics import face_load_factor
 from jaxgear.shafts import Housing, RigidSupport, annex_e, support
 
+pytestmark = pytest.mark.slow
+
 TORQUE = 50.0
 FLANK = jg.LeadSlope(4.0) + jg.LeadCrowning(5.0)
 
@@ -51,7 +53,6 @@ def rigid(mesh):
     return cycle
 
 
-@pytest.mark.slow
 def test_what_does_not_give_way_is_no_support(rigid, carried):
     stiff = gearbox(radial=1e12, modulus=1e14)
     assert_same(solved(support(stiff, 0)), rigid, rtol=1e-6)
@@ -60,26 +61,22 @@ def test_what_does_not_give_way_is_no_support(rigid, carried):
     assert np.abs(carried - rigid).max() > 0.02 * rigid.max()
 
 
-@pytest.mark.slow
 def test_a_rigid_support_and_none_are_alike(rigid):
     assert_same(solved(None), rigid)
     assert_same(solved(RigidSupport(PAIR)), rigid)
 
 
-@pytest.mark.slow
 def test_a_housing_of_no_compliance_is_none(carried):
     nodes = tuple(f"{seat}.{way}" for seat in "ABCD" for way in "xyz")
     assert_same(solved(support(gearbox(housing=Housing(nodes, np.zeros((12, 12)), "compliance")), 0)), carried)
 
 
-@pytest.mark.slow
 def test_a_mirrored_gearbox_mirrors_the_load(carried):
     turned = solved(support(gearbox(mirrored=True), 0), pinion=jg.LeadSlope(-4.0) + jg.LeadCrowning(5.0))
     np.testing.assert_allclose(turned.transmission_error, carried.transmission_error, rtol=1e-8)
     np.testing.assert_allclose(turned.line_load[:, ::-1], carried.line_load, rtol=1e-7, atol=1e-6)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("crowning", [5.0, 30.0])
 def test_one_pair_of_constant_stiffness_is_the_one_dimensional_analysis(crowning):
     """Teeth that do not pass their load on over the face, under a linear law, at the pitch point: that is what the
@@ -101,7 +98,6 @@ def test_one_pair_of_constant_stiffness_is_the_one_dimensional_analysis(crowning
     assert (load[0].min() == 0) == (crowning > 20)
 
 
-@pytest.mark.slow
 def test_teeth_that_pass_their_load_on_raise_the_factor_of_the_one_dimensional_analysis(carried):
     """A load gives way less the shorter it is; one stiffness along the face does not know. 5 to 25 % here."""
     given = support(gearbox(), 0)
@@ -110,7 +106,6 @@ def test_teeth_that_pass_their_load_on_raise_the_factor_of_the_one_dimensional_a
     assert 1.05 < float(face_load_factor(carried)) / alone < 1.25
 
 
-@pytest.mark.slow
 def test_a_contact_on_shafts_that_cannot_be_does_not_converge(mesh):
     assert mesh.status == Status.CONVERGED
     refused = eqx.tree_at(lambda of: of.support_status, mesh, jnp.int8(Status.SUPPORT_NOT_POSSIBLE))
@@ -138,7 +133,6 @@ def housed(values):
     )
 
 
-@pytest.mark.slow
 def test_derivatives_of_the_face_load_factor_are_central_differences():
     """By bearing, housing, slope and crowning, through shafts, influence and contact."""
 

@@ -12,6 +12,8 @@ import jaxgear as jg
 from jaxgear.metrics import findings_of
 from jaxgear.metrics.findings import finding_of_claim
 
+pytestmark = pytest.mark.slow
+
 TORQUES = (30.0, 50.0)
 BOX = {"amount": (0.0, 15.0)}
 
@@ -48,7 +50,6 @@ def verified(best, folder):
     return jg.optimize.verify(best, cache=folder)
 
 
-@pytest.mark.slow
 def test_both_numbers_are_those_of_the_two_structures(best, verified, flat, tabulated):
     flanks = best.pinion, best.wheel
     assert verified.claimed == pytest.approx(ppte(flat, 50.0, *flanks), rel=1e-9)
@@ -58,7 +59,6 @@ def test_both_numbers_are_those_of_the_two_structures(best, verified, flat, tabu
     assert 1e-3 < abs(verified.ppte - verified.claimed) < 0.1
 
 
-@pytest.mark.slow
 def test_the_measure_is_that_of_the_search(best, verified, flat, tabulated):
     for mesh, found in ((flat, verified.claimed_objectives), (tabulated, verified.objectives)):
         worst = max(ppte(mesh, torque, best.pinion, best.wheel) for torque in TORQUES)
@@ -67,14 +67,12 @@ def test_the_measure_is_that_of_the_search(best, verified, flat, tabulated):
     assert re.search(rf"^worst ppte \[um\] .*{best.objective:.4g} .* {worst:.4g}$", str(verified), re.MULTILINE)
 
 
-@pytest.mark.slow
 def test_flanks_without_an_objective_are_verified_too(best, verified, folder):
     found = jg.optimize.verify(replace(best, problem=None), cache=folder)
     assert found.objectives == found.claimed_objectives == {}
     assert found.ppte == verified.ppte and found.claimed == verified.claimed
 
 
-@pytest.mark.slow
 def test_levelled_flanks_are_verified_too(flat, tabulated, folder):
     level = jg.optimize.iterate_transmission_error(flat, 50.0, steps=1)
     found = jg.optimize.verify(level, cache=folder)
@@ -82,7 +80,6 @@ def test_levelled_flanks_are_verified_too(flat, tabulated, folder):
     assert found.ppte == pytest.approx(ppte(tabulated, 50.0, level.pinion, level.wheel), rel=1e-9)
 
 
-@pytest.mark.slow
 def test_a_contact_law_of_another_kind_is_verified_too(best, tabulated, folder):
     """Its prepared arrays are other ones, and no compiled program serves both."""
     legacy = jg.prepare(tabulated.pair, compliance=jg.legacy_compliance(), resolution=LINE)
@@ -92,7 +89,6 @@ def test_a_contact_law_of_another_kind_is_verified_too(best, tabulated, folder):
     assert verified.ppte == pytest.approx(ppte(tabulated, 50.0, best.pinion, best.wheel), rel=1e-9)
 
 
-@pytest.mark.slow
 def test_a_failed_solution_is_no_number(best, flat, folder):
     """Far more torque than two pairs can take."""
     second = jg.optimize.verification(flat, jg.optimize.structure_for(flat, cache=folder))
@@ -101,7 +97,6 @@ def test_a_failed_solution_is_no_number(best, flat, folder):
     assert second(cycle, {}, best.pinion, best.wheel).ppte == np.inf
 
 
-@pytest.mark.slow
 def test_free_flanks_on_the_finite_element_structure(tabulated):
     free = jg.free_form(tabulated, 50.0, points=8, steps=12, positions=None)
     assert free.mesh.compliance is tabulated.compliance
@@ -111,7 +106,6 @@ def test_free_flanks_on_the_finite_element_structure(tabulated):
         jg.optimize.verify(free)
 
 
-@pytest.mark.slow
 def test_claims_beyond_a_model_are_findings(best, flat, tabulated):
     """Each structure has its own limit, the second opinion is named, and rough designs are believed."""
     of_default = {claim: finding_of_claim(claim, flat.compliance, 0.0712) for claim in (0.11, 0.05, 0.02)}
@@ -124,7 +118,6 @@ def test_claims_beyond_a_model_are_findings(best, flat, tabulated):
     assert "PPTE 0.02 um is less than 0.1 um" in str(level) and "warning" not in str(best)
 
 
-@pytest.mark.slow
 def test_an_unmodified_pair_claims_nothing(flat):
     """Little load makes little transmission error, and that to a few per cent."""
     light = jg.solve(flat, 0.5)
