@@ -5,6 +5,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+import scipy
 from catalogue import LINE, gear_pair, ppte
 from known_optimum import BOX as TALL
 from known_optimum import DELTA0, Known, depth, grid, ppte_of, ppte_of_parabolas
@@ -12,6 +13,7 @@ from known_optimum import DELTA0, Known, depth, grid, ppte_of, ppte_of_parabolas
 import jaxgear as jg
 from jaxgear.conditions import conditions
 from jaxgear.numerics import decoded, next_generation
+from jaxgear.optimize.evaluate import halton
 from jaxgear.tolerance import GearTolerance
 
 TORQUE = 50.0
@@ -420,3 +422,10 @@ def test_refuses_a_design_that_makes_no_two_modifications(known, made, words):
 def test_refuses_meaningless_options(make, words):
     with pytest.raises(ValueError, match=words):
         make()
+
+
+@pytest.mark.parametrize("seed", [None, 3])
+def test_start_points_are_those_of_scipy(seed):
+    for dimensions, count in ((1, 1), (9, 200)):
+        known = scipy.stats.qmc.Halton(dimensions, scramble=seed is not None, seed=seed).random(count)
+        np.testing.assert_array_equal(halton(dimensions, count, seed), known)

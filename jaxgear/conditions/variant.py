@@ -16,7 +16,7 @@ from ..contact import Mesh, MeshCycle, removed_material, solve_removed
 from ..contact.operating_point import Torque, operating_point_of
 from ..contact.status import Status, Statuses, status_of
 from ..microgeometry import AbstractModification, NoModification
-from ..numerics import Checked, fields_of, real
+from ..numerics import Checked, fields_of, program, real
 from ..tolerance import Tolerance
 from .cases import Cases, Conditions, Loads, LoadSpectrum, conditions
 
@@ -240,10 +240,23 @@ def cycle_status(cycle: MeshCycle) -> Statuses:
 
     The transmission error has to be finite too: reductions of the backend can drop NaN.
     """
-    infinite = ~jnp.isfinite(jnp.sum(cycle.transmission_error, axis=-1))
-    return status_of({Status.NOT_CONVERGED: infinite}, jnp.max(cycle.status, axis=-1))
+    return _over_positions(cycle.transmission_error, cycle.status)
 
 
 def solved(cycle: MeshCycle) -> Bool[Array, "*cycles"]:
     """Whether `cycle_status` is `Status.CONVERGED`."""
-    return cycle_status(cycle) == Status.CONVERGED
+    return _converged(cycle_status(cycle))
+
+
+# programs of their own: operations on their own would be compiled one by one
+
+
+@program
+def _over_positions(transmission_error: Float[Array, "*cycles positions"], status: Statuses) -> Statuses:
+    infinite = ~jnp.isfinite(jnp.sum(transmission_error, axis=-1))
+    return status_of({Status.NOT_CONVERGED: infinite}, jnp.max(status, axis=-1))
+
+
+@program
+def _converged(status: Statuses) -> Bool[Array, "*cycles"]:
+    return status == Status.CONVERGED

@@ -31,6 +31,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ..compliance import default_compliance
+from ..geometry import GearPair
 from ..microgeometry import AbstractModification, NoModification
 from ..numerics import Checked, Numbers, changed, program, real, result, stored
 from .contact_width import (
@@ -244,14 +245,27 @@ def loaded_material(
     prepared = _unlabelled(mesh, sizes.of_material)
     if not mesh.compliance.averages_over_loaded_width:
         return slid_material(prepared, torque, pinion, wheel, own=own)
-    full = 1e3 * torque / (mesh.pair.pinion.base_radius * mesh.pair.face_width)
-    line_load = jnp.broadcast_to(full, (sizes.chosen_pairs, sizes.slices, sizes.positions))
+    line_load = _full_load(mesh.pair, torque, (sizes.chosen_pairs, sizes.slices, sizes.positions))
     line_load, residual = first_contact(slid_material(prepared, torque, pinion, wheel, line_load, own))
     # once: what the loads of a second solution change is below the error of the model
     removed = slid_material(prepared, torque, pinion, wheel, line_load, own)
-    # written so that NaN counts as not known
-    known = jnp.where(residual < max(_WIDTHS_KNOWN, sizes.rtol or 0.0), removed.amount, jnp.nan)
+    known = _where_known(removed.amount, residual, max(_WIDTHS_KNOWN, sizes.rtol or 0.0))
     return RemovedMaterial(known, removed.shift, removed.relative_curvature)
+
+
+# programs of their own: operations on their own would be compiled one by one
+
+
+@program
+def _full_load(pair: GearPair, torque: Scalar, shape: tuple[int, ...]) -> Load:
+    """Line load of one pair that carries all of it [N/mm]."""
+    return jnp.broadcast_to(1e3 * torque / (pair.pinion.base_radius * pair.face_width), shape)
+
+
+@program
+def _where_known(amount: Load, residual: Curve, largest: float) -> Load:
+    """Material removed where the loads are known, else NaN; written so that NaN counts as not known."""
+    return jnp.where(residual < largest, amount, jnp.nan)
 
 
 def for_contact(mesh: Mesh) -> Mesh:

@@ -5,7 +5,6 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import ClassVar
 
 import numpy as np
-import scipy
 
 from ..conditions import Design
 from ..conditions.cases import Loads
@@ -14,7 +13,7 @@ from ..numerics import AbstractMeasure, Callback
 from ..numerics.fields import Checked, count
 from ..numerics.pareto import pareto_front
 from ..tolerance import Tolerance
-from .evaluate import start_points
+from .evaluate import halton, start_points
 from .goal import Constraint, Objective, counted
 from .linear_model import AbstractScalarization, Linearizer, LinearModel
 from .problem import Problem, make_problem
@@ -316,5 +315,5 @@ def _weights(count: int, objectives: int) -> np.ndarray:
         first = np.linspace(END, 1 - END, count)
         return np.stack([first, 1 - first], axis=1)
     # spacings of sorted uniform numbers are uniform on the simplex
-    cuts = np.sort(scipy.stats.qmc.Halton(objectives - 1, scramble=False).random(count + 1)[1:], axis=1)
+    cuts = np.sort(halton(objectives - 1, count + 1)[1:], axis=1)
     return np.diff(np.concatenate([np.zeros((count, 1)), cuts, np.ones((count, 1))], axis=1), axis=1)

@@ -46,6 +46,7 @@ GREY = "#595959"
 PALE = "#D9D9D9"
 _BOLD, _BEFORE_LINES = 2.6, 2.5  # width [pt] and zorder of the line that a figure is about
 _LEGEND_LINE = 12.0  # [pt]
+_SURELY = 0.9  # share of the width of a new figure's only Axes that is left to them whatever stands beside them
 ABOVE = 4.0  # [pt]; between the Axes and a legend over them
 ABOVE_MARKS = 16.0  # [pt]; clears a line of text that stands on the Axes
 
@@ -181,9 +182,9 @@ def legend_above(ax: Axes, *, distance: float = ABOVE) -> int:
     handles, labels = ax.get_legend_handles_labels()
     if not handles:
         return 0
-    room = laid_out_size(ax)[0]
     lift = ScaledTranslation(0, distance / _POINTS_PER_INCH, _root(ax).dpi_scale_trans)
-    for columns in range(len(labels), 0, -1):
+
+    def width_of(columns: int) -> float:
         legend = ax.legend(
             handles,
             labels,
@@ -197,8 +198,16 @@ def legend_above(ax: Axes, *, distance: float = ABOVE) -> int:
             handlelength=2.6,
             columnspacing=1.5,
         )
-        if _in_points(ax, legend.get_window_extent().width) <= room:
-            break
+        return _in_points(ax, legend.get_window_extent().width)
+
+    columns = len(labels)
+    if len(_root(ax).axes) == 1 and width_of(columns) <= _SURELY * _in_points(ax, ax.get_window_extent().width):
+        return 1  # wherever the Axes will be laid out, which takes as long to find out as to draw them
+    if (legend := ax.get_legend()) is not None:
+        legend.remove()  # which takes its room from the Axes
+    room = laid_out_size(ax)[0]
+    while width_of(columns) > room and columns > 1:
+        columns -= 1
     return -(-len(labels) // columns)
 
 

@@ -29,7 +29,7 @@ class DesignOptimization(AbstractStudy[ComparisonResult]):
 
     name: ClassVar = "optimize"
     coarse: ClassVar = ""  # the result says it
-    needs: ClassVar = ("scipy.optimize", "scipy.stats")
+    needs: ClassVar = ("scipy.optimize",)
 
     request: OptimizeRequest
     tolerance: Tolerance | None
