@@ -24,8 +24,9 @@ def _van_der_corput(count: int, base: int, rng: np.random.Generator | None) -> n
     """Numbers whose digits after the point are those of 0, 1, 2, ... from the last one on, or permutations of them."""
     digits = int(np.ceil(54 / np.log2(base))) - 1  # that a double can show
     permuted = np.repeat(np.arange(base)[None], digits, axis=0)
-    for each in permuted if rng is not None else ():
-        rng.shuffle(each)
+    if rng is not None:
+        for each in permuted:
+            rng.shuffle(each)
     left, found, place = np.arange(count), np.zeros(count), 1.0
     for each in permuted:
         place /= base
