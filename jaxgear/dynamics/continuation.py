@@ -8,15 +8,16 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Complex, Float
 
-from ..numerics import Checked, Given, Numbers, check, kernel, real, result, whole
+from ..numerics import Checked, Given, Numbers, check, kernel, program, real, result, whole
 from .bifurcation import Bifurcation, Kind, Tests, bifurcation_at, tests_of
 from .orbit import Orbit, orbit_at
-from .oscillator import Oscillator
+from .oscillator import Oscillator, State
 from .poincare import (
     STEPS,
     Corrected,
     Family,
     OverSpeed,
+    Place,
     Scales,
     corrected,
     family_of,
@@ -134,10 +135,8 @@ class _Follower:
         self.nodes, at = nodes, real(given).astype(dtype)
         self.low, self.high = (float(end) for end in within)
         check("follow_orbits", "parameter of the start", at, "", low=self.low, high=self.high)
-        z = scaled(orbit.start, orbit.mesh_frequency)
-        self.scales = Scales(jnp.linalg.norm(z), jnp.maximum(jnp.abs(at), 1e-30))
-        ahead = first_direction(len(z) + 1, dtype, 1.0 if direction == "up" else -1.0)
-        self.point, self.orbit = self.at(self.scales.place(z, at), ahead)
+        self.scales, place, ahead = _first(orbit.start, orbit.mesh_frequency, at, direction == "up")
+        self.point, self.orbit = self.at(place, ahead)
         if not bool(self.point.converged):
             raise ValueError("follow_orbits: there is no orbit of the branch near the start")
         if flip:
@@ -250,6 +249,14 @@ class _Follower:
             before=tuple(self.before),
             ended=ended,
         )
+
+
+@program
+def _first(start: State, frequency: Scalar, parameter: Scalar, up: bool) -> tuple[Scales, Place, Place]:
+    """Scales of a branch, and the place of its first orbit with the direction in which the parameter changes."""
+    z = scaled(start, frequency)
+    scales = Scales(jnp.linalg.norm(z), jnp.maximum(jnp.abs(parameter), 1e-30))
+    return scales, scales.place(z, parameter), first_direction(len(z) + 1, z.dtype, 1.0 if up else -1.0)
 
 
 @kernel

@@ -115,11 +115,12 @@ def _coast_phase(mesh: Mesh):
 def static(flanks: Flanks, torque: Scalar, compliance: Scalar) -> Static:
     """Static contact of one side."""
     cycle = solve_removed(flanks.mesh, torque, flanks.removed)
-    force = cycle.force
-    found = Static(
-        cycle.unloaded_transmission_error,
-        cycle.transmission_error + compliance * force,
-        1 / (1 / cycle.tangent_stiffness + compliance),
-        cycle.status,
-    )
-    return Static(*(part[flanks.order] for part in found))
+    found = Static(cycle.unloaded_transmission_error, cycle.transmission_error, cycle.tangent_stiffness, cycle.status)
+    return _in_series(found, cycle.force, compliance, flanks.order)
+
+
+@program
+def _in_series(found: Static, force: Scalar, compliance: Scalar, order: Any) -> Static:
+    """Static contact with the series compliance, in the order of the drive flanks."""
+    loaded, stiffness = found.loaded + compliance * force, 1 / (1 / found.stiffness + compliance)
+    return Static(*(part[order] for part in found._replace(loaded=loaded, stiffness=stiffness)))

@@ -10,7 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, PyTree
 
-from ..numerics import Checked, bracketed_root, number, real
+from ..numerics import Checked, bracketed_root, number, program, real
 
 # Doublings of 1 um until a bracket holds the DTE of a force; there is no root where they do not suffice.
 _DOUBLINGS = 40
@@ -76,8 +76,7 @@ class AbstractMeshForce(Checked):
         The stiffness that a small vibration about the static transmission error meets: natural frequencies and
         damping ratios refer to it.
         """
-        force = real(force)
-        return self.over_cycle(lambda phase: self.stiffness(phase, self.static_te(phase, force)), force.dtype)
+        return _mean_tangent_stiffness(self, real(force))
 
     def mean_secant_stiffness(self, force: Scalar) -> Scalar:
         """A static force [N], not zero, over the mean deflection of the mesh cycle under it [N/um].
@@ -86,17 +85,25 @@ class AbstractMeshForce(Checked):
         stiffness of a linear spring with the same mean deflection, below the tangent one since contacts stiffen from
         zero on. Studies that know a static transmission error and no slope state it.
         """
-        force = real(force)
-
-        def deflection(phase):
-            return self.static_te(phase, force) - self.static_te(phase, _TOUCHING * force)
-
-        return (1 - _TOUCHING) * force / self.over_cycle(deflection, force.dtype)
+        return _mean_secant_stiffness(self, real(force))
 
     def over_cycle(self, of: Callable[[Scalar], Scalar], dtype: np.dtype) -> Scalar:
         """Mean of a function of the mesh position over a cycle, each position for the step about it."""
         begin = self.nodes(self.averaged_positions).astype(dtype)
         return jnp.sum(jnp.diff(begin) * jax.vmap(of)((begin[:-1] + begin[1:]) / 2))
+
+
+@program
+def _mean_tangent_stiffness(of: AbstractMeshForce, force: Scalar) -> Scalar:
+    return of.over_cycle(lambda phase: of.stiffness(phase, of.static_te(phase, force)), force.dtype)
+
+
+@program
+def _mean_secant_stiffness(of: AbstractMeshForce, force: Scalar) -> Scalar:
+    def deflection(phase):
+        return of.static_te(phase, force) - of.static_te(phase, _TOUCHING * force)
+
+    return (1 - _TOUCHING) * force / of.over_cycle(deflection, force.dtype)
 
 
 @partial(jax.jit, inline=True)

@@ -14,9 +14,9 @@ from ..contact.operating_point import Torque, operating_point_of
 from ..contact.solve import check_mesh, more_pairs_help
 from ..contact.status import Status, status_of
 from ..microgeometry import AbstractModification
-from ..numerics import Given, check, concrete, over_slices, real, whole
+from ..numerics import Given, check, concrete, over_slices, program, real, whole
 from ..numerics.programs import is_eager
-from .drive_and_coast import Both, Flanks, Static, coast_flanks, drive_flanks, static
+from .drive_and_coast import Both, Static, coast_flanks, drive_flanks, static
 from .force import AbstractMeshForce
 from .force_map import FlankSprings, ForceMap, Tangent, tabulate
 
@@ -137,9 +137,9 @@ def interpolated(deviation: Given, of: Mesh, mesh: Mesh) -> Float[Array, "pairs 
     return jnp.moveaxis(found.reshape(wide, -1, mesh.resolution.positions), 0, 1)[::-1]
 
 
-def _besides(deviation: Given | None, of: Mesh, mesh: Mesh) -> Array | float:
-    """`interpolated`; a number where there are no deviations."""
-    return 0.0 if deviation is None else interpolated(deviation, of, mesh)
+def _besides(deviation: Given | None, of: Mesh, mesh: Mesh) -> Array | None:
+    """`interpolated`; None where there are no deviations."""
+    return None if deviation is None else interpolated(deviation, of, mesh)
 
 
 def _number(name: str, value: Any, unit: str, mesh: Mesh, **limits) -> Scalar:
@@ -162,27 +162,50 @@ def _coast_of(coast: Any, drive: Both) -> Both:
 
 def _made(mesh, torque, both, deviation, model, levels, reach, compliance) -> ForceMap | FlankSprings | Tangent:
     drive = drive_flanks(mesh, torque, both[0])
-    sides = drive._replace(removed=drive.removed + deviation), coast_flanks(mesh, torque, both[1])
+    drive = drive if deviation is None else drive._replace(removed=drive.removed + deviation)
+    sides = drive, coast_flanks(mesh, torque, both[1])
     found = _of_both(lambda side: static(side, torque, compliance), sides)
     force, first = 1e3 * torque / mesh.pair.pinion.base_radius, mesh.kinematics.first_phase
-    statuses = [jnp.max(side.status) for side in found]
     if model == "tangent":
-        return Tangent(first, force, found[0].loaded, found[0].stiffness, statuses[0])
-    start = jnp.stack([each.unloaded + side.clearance for each, side in zip(found, sides)])
-    status = status_of({Status.GEARS_CANNOT_RUN: _jammed(start)}, *statuses)
-    deflection = jnp.stack([each.loaded - each.unloaded for each in found])
+        return Tangent(first, force, found[0].loaded, found[0].stiffness, jnp.max(found[0].status))
+    start, deflection, least, status = _touching(found, [side.clearance for side in sides])
+    _check_clearance(least)
     if model == "varying stiffness":
         return FlankSprings(first, start, force / deflection, status)
     if model == "loaded error":
         mean = jnp.mean(deflection, axis=1)
         return FlankSprings(first, start + deflection - mean[:, None], force / mean, status)
-    farthest = reach * jnp.max(deflection[0])
-    both = tuple((side, _in_own_order(side, each)) for side, each in zip(sides, found))
-    drive, coast = _of_both(lambda of: tabulate(of[0], of[1], compliance, farthest, levels), both)
+    farthest = _times_largest(reach, deflection[0])
+    both = tuple((side, _in_order(each.unloaded, side.order)) for side, each in zip(sides, found))
+    tables = _of_both(lambda of: tabulate(of[0], of[1], compliance, farthest, levels), both)
+    return _map_of(first, start, farthest, tables, status)
+
+
+# programs of their own: operations on their own would be compiled one by one
+
+
+@program
+def _touching(found: list[Static], clearances: list[Any]) -> tuple[Array, Array, Array, Any]:
+    """DTE at which both flanks touch, their deflection under the torque, the least clearance, and the status."""
+    start = jnp.stack([each.unloaded + clearance for each, clearance in zip(found, clearances)])
+    deflection = jnp.stack([each.loaded - each.unloaded for each in found])
+    least = jnp.min(start[0] + start[1])
+    statuses = [jnp.max(each.status) for each in found]
+    return start, deflection, least, status_of({Status.GEARS_CANNOT_RUN: least < -_JAMMED}, *statuses)
+
+
+@program
+def _times_largest(share: Scalar, values: Array) -> Scalar:
+    return share * jnp.max(values)
+
+
+@program
+def _map_of(first_phase: Any, start: Array, reach: Scalar, tables: list[Any], status: Any) -> ForceMap:
+    (drive, coast) = tables
     return ForceMap(
-        first_phase=first,
+        first_phase=first_phase,
         start=start,
-        reach=farthest,
+        reach=reach,
         node_force=jnp.stack([drive[0], coast[0]]),
         node_stiffness=jnp.stack([drive[1], coast[1]]),
         status=status_of({}, status, drive[2], coast[2]),
@@ -200,18 +223,17 @@ def _of_both(function: Callable[[Any], Any], sides: tuple[Any, Any]) -> list[Any
     return [jax.tree.map(lambda part: part[number], found) for number in range(len(sides))]  # noqa: B023 - at once
 
 
-def _in_own_order(side: Flanks, found: Static):
-    # the order of drive flanks is the identity, that of coast flanks its own inverse
-    return found.unloaded[side.order]
+@program
+def _in_order(unloaded: Array, order: Any) -> Array:
+    """In the order of a side's own: that of drive flanks is the identity, that of coast flanks its own inverse."""
+    return unloaded[order]
 
 
-def _jammed(start):
-    """Whether flanks press on both sides without a load; of concrete numbers an error."""
-    least = jnp.min(start[0] + start[1])
+def _check_clearance(least: Scalar) -> None:
+    """Refuses flanks that press on both sides without a load, where the numbers are concrete."""
     known = concrete(least)
     if known is not None and known < -_JAMMED:
         raise ValueError(
             f"mesh_force: the clearance between drive and coast flanks = {float(known):.4g} um must be at least 0 um: "
             "the modifications add material, and the pair has too little backlash"
         )
-    return least < -_JAMMED

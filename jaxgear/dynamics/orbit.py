@@ -101,7 +101,12 @@ class Orbit(WithStatus, Checked):
     @property
     def stable(self) -> Bool[Array, "..."]:
         """Whether no small deviation grows: no multiplier lies outside of the unit circle."""
-        return ~jnp.any(outside(jnp.abs(jnp.linalg.eigvals(jax.lax.stop_gradient(self.monodromy)))), axis=-1)
+        return _stable(self.monodromy)
+
+
+@program
+def _stable(monodromy: Float[Array, "*orbits unknowns unknowns"]) -> Bool[Array, "*orbits"]:
+    return ~jnp.any(outside(jnp.abs(jnp.linalg.eigvals(jax.lax.stop_gradient(monodromy)))), axis=-1)
 
 
 @program

@@ -60,7 +60,7 @@ def branches_of(oscillator: Oscillator, runs: Mapping[str, SpeedResponse], steps
 
 def _followed(oscillator, response: SpeedResponse, place: int, direction: Any, steps: int) -> Iterator[Branch]:
     frequencies = np.asarray(response.mesh_frequency, float)
-    periods, start = int(response.period[place]), jax.tree.map(lambda part: part[place], response.state)
+    periods, start = int(response.period[place]), jax.tree.map(lambda part: np.asarray(part)[place], response.state)
     orbit = find_orbit(oscillator, frequencies[place], start, periods=periods, steps=steps)
     if not bool(orbit.converged):
         return
