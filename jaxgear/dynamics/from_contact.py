@@ -225,7 +225,7 @@ def _of_both(function: Callable[[Any], Any], sides: tuple[Any, Any]) -> list[Any
 
 @program
 def _in_order(unloaded: Array, order: Any) -> Array:
-    """In the order of a side's own: that of drive flanks is the identity, that of coast flanks its own inverse."""
+    """Numbers in the order of drive flanks in that of their own side, which for coast flanks is its own inverse."""
     return unloaded[order]
 
 
