@@ -12,8 +12,7 @@ from known_optimum import DELTA0, Known, depth, grid, ppte_of, ppte_of_parabolas
 
 import jaxgear as jg
 from jaxgear.conditions import conditions
-from jaxgear.numerics import decoded, next_generation
-from jaxgear.optimize.evaluate import halton
+from jaxgear.numerics import decoded, halton, next_generation
 from jaxgear.tolerance import GearTolerance
 
 TORQUE = 50.0

@@ -248,9 +248,6 @@ def solved(cycle: MeshCycle) -> Bool[Array, "*cycles"]:
     return _converged(cycle_status(cycle))
 
 
-# programs of their own: operations on their own would be compiled one by one
-
-
 @program
 def _over_positions(transmission_error: Float[Array, "*cycles positions"], status: Statuses) -> Statuses:
     infinite = ~jnp.isfinite(jnp.sum(transmission_error, axis=-1))

@@ -253,9 +253,6 @@ def loaded_material(
     return RemovedMaterial(known, removed.shift, removed.relative_curvature)
 
 
-# programs of their own: operations on their own would be compiled one by one
-
-
 @program
 def _full_load(pair: GearPair, torque: Scalar, shape: tuple[int, ...]) -> Load:
     """Line load of one pair that carries all of it [N/mm]."""

@@ -134,15 +134,16 @@ def tabulate(
 
     Args:
         flanks: of one side.
-        unloaded: DTE at which the flanks touch [um], in the order of the flanks' own mesh.
+        unloaded: DTE at which the flanks touch [um], in the order of the drive flanks as what is returned.
         compliance: in series [um/N].
         reach: of the last level [um].
         levels: their number.
     """
     above, apart = dte_levels(reach, levels)[1:], distances(reach, levels)
+    own = unloaded[flanks.order]  # which is its own inverse: of the drive flanks the identity
 
     def at(level):
-        return solve_series(flanks.mesh, unloaded + level, flanks.removed, compliance)
+        return solve_series(flanks.mesh, own + level, flanks.removed, compliance)
 
     found = jax.vmap(at)(above)
     force, slope = found.force.T, found.stiffness.T

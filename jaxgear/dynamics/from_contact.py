@@ -168,35 +168,27 @@ def _made(mesh, torque, both, deviation, model, levels, reach, compliance) -> Fo
     force, first = 1e3 * torque / mesh.pair.pinion.base_radius, mesh.kinematics.first_phase
     if model == "tangent":
         return Tangent(first, force, found[0].loaded, found[0].stiffness, jnp.max(found[0].status))
-    start, deflection, least, status = _touching(found, [side.clearance for side in sides])
+    start, deflection, farthest, least, status = _touching(found, [side.clearance for side in sides], reach)
     _check_clearance(least)
     if model == "varying stiffness":
         return FlankSprings(first, start, force / deflection, status)
     if model == "loaded error":
         mean = jnp.mean(deflection, axis=1)
         return FlankSprings(first, start + deflection - mean[:, None], force / mean, status)
-    farthest = _times_largest(reach, deflection[0])
-    both = tuple((side, _in_order(each.unloaded, side.order)) for side, each in zip(sides, found))
-    tables = _of_both(lambda of: tabulate(of[0], of[1], compliance, farthest, levels), both)
+    touching = (sides[0], found[0].unloaded), (sides[1], found[1].unloaded)
+    tables = _of_both(lambda of: tabulate(of[0], of[1], compliance, farthest, levels), touching)
     return _map_of(first, start, farthest, tables, status)
 
 
-# programs of their own: operations on their own would be compiled one by one
-
-
 @program
-def _touching(found: list[Static], clearances: list[Any]) -> tuple[Array, Array, Array, Any]:
-    """DTE at which both flanks touch, their deflection under the torque, the least clearance, and the status."""
+def _touching(found: list[Static], clearances: list[Any], reach: Scalar) -> tuple[Array, Array, Scalar, Scalar, Any]:
+    """DTE at which both flanks touch, deflection under the torque and `reach` of its most, least clearance, status."""
     start = jnp.stack([each.unloaded + clearance for each, clearance in zip(found, clearances)])
     deflection = jnp.stack([each.loaded - each.unloaded for each in found])
     least = jnp.min(start[0] + start[1])
     statuses = [jnp.max(each.status) for each in found]
-    return start, deflection, least, status_of({Status.GEARS_CANNOT_RUN: least < -_JAMMED}, *statuses)
-
-
-@program
-def _times_largest(share: Scalar, values: Array) -> Scalar:
-    return share * jnp.max(values)
+    status = status_of({Status.GEARS_CANNOT_RUN: least < -_JAMMED}, *statuses)
+    return start, deflection, reach * jnp.max(deflection[0]), least, status
 
 
 @program
@@ -221,12 +213,6 @@ def _of_both(function: Callable[[Any], Any], sides: tuple[Any, Any]) -> list[Any
     stacked = jax.tree.map(lambda *parts: jnp.stack(parts), drive, coast)
     found = jax.lax.map(lambda arrays: function(eqx.combine(arrays, like)), stacked)
     return [jax.tree.map(lambda part: part[number], found) for number in range(len(sides))]  # noqa: B023 - at once
-
-
-@program
-def _in_order(unloaded: Array, order: Any) -> Array:
-    """Numbers in the order of drive flanks in that of their own side, which for coast flanks is its own inverse."""
-    return unloaded[order]
 
 
 def _check_clearance(least: Scalar) -> None:

@@ -45,6 +45,7 @@ from .implicit import newton as newton
 from .implicit import solve as solve
 from .implicit import with_jacobian as with_jacobian
 from .pareto import decoded as decoded
+from .pareto import halton as halton
 from .pareto import next_generation as next_generation
 from .pareto import random_strings as random_strings
 from .programs import compile_quickly as compile_quickly

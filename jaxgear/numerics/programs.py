@@ -243,7 +243,10 @@ def kernel(function: Callable[_Given, _Found]) -> Callable[_Given, _Found]:
 
 
 def program(function: Callable[_Given, _Found]) -> Callable[_Given, _Found]:
-    """`quick_jit`, for a function that compiles for longer than it runs; kept where a store is in use."""
+    """`quick_jit`, for a function that compiles for longer than it runs; kept where a store is in use.
+
+    What joins two programs is one too: its operations would be compiled one by one in every process.
+    """
     return _compiled(function, quick=True)
 
 

@@ -6,43 +6,9 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ..conditions.join import padded, side_by_side
-from ..numerics import kernel
+from ..numerics import halton, kernel
 from .goal import counted
 from .problem import Problem, Score
-
-
-def halton(dimensions: int, count: int, seed: int | None = None) -> np.ndarray:
-    """Points of a Halton sequence in the unit box, shape (count, dimensions); with a seed scrambled (Owen 2017).
-
-    Those of `scipy.stats.qmc.Halton`, which takes longer to import than a search may take.
-    """
-    rng = None if seed is None else np.random.default_rng(seed)
-    return np.stack([_van_der_corput(count, base, rng) for base in _primes(dimensions)], axis=1)
-
-
-def _van_der_corput(count: int, base: int, rng: np.random.Generator | None) -> np.ndarray:
-    """Numbers whose digits after the point are those of 0, 1, 2, ... from the last one on, or permutations of them."""
-    digits = int(np.ceil(54 / np.log2(base))) - 1  # that a double can show
-    permuted = np.repeat(np.arange(base)[None], digits, axis=0)
-    if rng is not None:
-        for each in permuted:
-            rng.shuffle(each)
-    left, found, place = np.arange(count), np.zeros(count), 1.0
-    for each in permuted:
-        place /= base
-        found += each[left % base] * place
-        left //= base
-    return found
-
-
-def _primes(count: int) -> list[int]:
-    found: list[int] = []
-    number = 2
-    while len(found) < count:
-        if all(number % prime for prime in found):
-            found.append(number)
-        number += 1
-    return found
 
 
 def start_points(problem: Problem, count: int) -> np.ndarray:

@@ -9,11 +9,11 @@ import numpy as np
 from ..conditions import Design
 from ..conditions.cases import Loads
 from ..contact import Mesh
-from ..numerics import AbstractMeasure, Callback
+from ..numerics import AbstractMeasure, Callback, halton
 from ..numerics.fields import Checked, count
 from ..numerics.pareto import pareto_front
 from ..tolerance import Tolerance
-from .evaluate import halton, start_points
+from .evaluate import start_points
 from .goal import Constraint, Objective, counted
 from .linear_model import AbstractScalarization, Linearizer, LinearModel
 from .problem import Problem, make_problem

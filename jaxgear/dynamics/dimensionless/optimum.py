@@ -8,13 +8,12 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-import scipy
 from jaxtyping import Array, Float, Int8
 
 from ...contact.status import Statuses, WithStatus
 from ...microgeometry import Linear, Polynomial, Power, Quadratic
 from ...numerics import Checked, Given, Numbers, check, concrete, kernel, real, result, spread, whole
-from ...numerics.pareto import decoded, next_generation, random_strings
+from ...numerics.pareto import decoded, halton, next_generation, random_strings
 from .model import DimensionlessModel, with_relief
 from .relief import CycleRelief
 from .settle import _settle, at_rest
@@ -234,7 +233,7 @@ def _steps(frequency) -> int:
 
 def _spread(like: Float[Array, " numbers"]) -> Float[Array, "designs numbers"]:
     """Points of a Halton sequence in the unit box, always the same."""
-    return jnp.asarray(scipy.stats.qmc.Halton(len(like), scramble=False).random(_SPREAD), like.dtype)
+    return jnp.asarray(halton(len(like), _SPREAD), like.dtype)
 
 
 def _static_amplitude(model: DimensionlessModel, relief: CycleRelief) -> Scalar:
