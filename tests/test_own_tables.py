@@ -13,6 +13,7 @@ from jaxgear.io import DesignFileError, reference
 from jaxgear.microgeometry import AbstractCurve, Linear
 from jaxgear.numerics import Checked, number
 from jaxgear.numerics.fields import count
+from jaxgear.vocabulary import quantities
 
 
 @pytest.fixture
@@ -130,6 +131,14 @@ def test_of_two_classes_of_a_name_the_later_is_meant_but_none_takes_the_place_of
     with pytest.raises(DesignFileError, match=r"lubricant\.b: unknown key"):
         load(text(load="speed = 9.0", tail="[lubricant]\nb = 2.0\n"))
     assert (First.table, Gears.table) == ("twice", "pinion")
+
+
+def test_a_table_without_settings_says_so(load):
+    project = load(text(tail='[project]\ncustomer = "a"\n')).tables["project"]
+    with pytest.raises(
+        DesignFileError, match=r'^optimize\.objective: "ppte" takes settings, which \[project\] does not give'
+    ):
+        project.quantity(None, "optimize.objective", quantities["ppte"])
 
 
 def test_the_reference_lists_the_tables_of_the_library_alone():

@@ -105,9 +105,9 @@ class FurtherTable(FileTable):
             quantity: of the vocabulary.
 
         Raises:
-            DesignFileError: where the table does not say all that the quantity needs.
+            DesignFileError: where the table does not say all that the quantity needs; by default nothing.
         """
-        raise NotImplementedError
+        raise DesignFileError(key, f'"{quantity.name}" takes settings, which [{self.table}] does not give')
 
     @classmethod
     def inner(cls) -> Mapping[str, type[FileTable]]:
