@@ -94,6 +94,7 @@ def test_c_has_the_steady_states_of_the_sweep(moving, swept):
     np.testing.assert_allclose(kernel.settle(SPEEDS[1], state, 2 * int(swept.period[1])), state, rtol=1e-7)
 
 
+@pytest.mark.slow
 def test_scipy_has_the_steady_states_of_the_sweep(moving, swept):
     solver = ScipySweep(vibration_of(moving), "DOP853", 1e-6)
     before = [float(part[1, 0]) for part in swept.state]

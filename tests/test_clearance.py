@@ -34,6 +34,7 @@ def test_a_shaft_lies_against_its_bearings_in_the_direction_of_the_load():
     np.testing.assert_allclose(found.shaft[:, :2], moved[:, None] * np.array([0.6, 0.8]), rtol=1e-9)
 
 
+@pytest.mark.slow
 def test_no_clearance_is_no_clearance():
     given, zero = stage(1e-9), stage(0.0)
     np.testing.assert_allclose(support(given).influence(Y), support(zero).influence(Y), rtol=1e-6)

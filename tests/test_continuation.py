@@ -43,6 +43,7 @@ def near(branch, omega, stable):
     return [jax.tree.map(lambda part, i=i: part[i], branch.orbits) for i in passes if branch.stable[i] == stable]
 
 
+@pytest.mark.slow
 def test_the_primary_resonance_folds_twice(resonance):
     assert resonance.ended == "range"
     assert [found.kind for found in resonance.bifurcations] == ["fold", "fold"]

@@ -75,6 +75,7 @@ def test_a_metric_of_many_cycles_is_that_of_each(measured, name):
             np.testing.assert_allclose(whole[index], part, rtol=1e-12, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_more_relief_shortens_the_contact(batch):
     """One effective contact ratio per design, not one for all."""
     ratio = np.asarray(jg.effective_contact_ratio(batch))

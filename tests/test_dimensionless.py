@@ -272,6 +272,7 @@ def identified():
     return cycle, identify(cycle, mass=0.3, damping_ratio=0.05, half_clearance=40.0)
 
 
+@pytest.mark.slow
 def test_identified_model_has_the_static_transmission_error_of_the_mesh(identified):
     """With all its harmonics: mean and variation, 1 + (error - mean unloaded one) / b."""
     cycle, _ = identified

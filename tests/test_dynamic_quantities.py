@@ -105,6 +105,7 @@ def nearby(mesh):
     return several, way
 
 
+@pytest.mark.slow
 def test_slopes_along_a_change_of_what_vibrates_are_those_of_differences(mesh, nearby):
     """Of the mesh force by the relief, at every speed of every run."""
     several, way = nearby

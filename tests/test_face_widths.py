@@ -277,6 +277,7 @@ def test_line_loads_by_few_modes_are_those_by_all(width, overhangs, even, others
         assert np.abs(few - whole).max() < most * whole.max()
 
 
+@pytest.mark.slow
 def test_few_modes_of_flush_ends_have_derivatives():
     weight = np.random.default_rng(0).normal(size=(2, 9, 9))
 
@@ -292,6 +293,7 @@ def test_few_modes_of_flush_ends_have_derivatives():
         np.testing.assert_allclose(slopes[index], (ends[0] - ends[1]) / (2 * step), rtol=1e-5)
 
 
+@pytest.mark.slow
 def test_models_of_two_dimensions_know_no_overhang():
     """In one plane a wider pinion is the same pinion: references in two dimensions have one width."""
 

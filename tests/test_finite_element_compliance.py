@@ -87,6 +87,7 @@ def test_unmodified_gears_deflect_as_in_the_reference(folder):
     assert bool(cycle.converged.all())
 
 
+@pytest.mark.slow
 def test_a_table_serves_every_size_and_modulus(tabulated, usual, folder):
     large = prepared(pair(module=8.0, face_width=48.0, modulus=103e3), tabulated)
     np.testing.assert_allclose(large.structure, 2 * usual.structure, rtol=1e-9)

@@ -84,6 +84,7 @@ def test_is_level_between_its_own_positions_too(named, optimum):
     assert left < 0.02 * ppte(fine, TORQUE)
 
 
+@pytest.mark.slow
 def test_removes_nothing_in_common(mesh, optimum):
     """What both flanks of a gear pair lose everywhere shifts the transmission error and is not ground off."""
     values = tables(optimum)

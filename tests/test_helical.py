@@ -71,6 +71,7 @@ def test_an_angle_of_zero_is_a_spur_gear():
     assert not pair_of().is_spur and helical_slices(pair_of()) == 11
 
 
+@pytest.mark.slow
 def test_a_small_angle_goes_to_the_spur_gear():
     """Nothing jumps where contact lines begin to run across the face, the largest pressure included."""
     mesh, spur = solved(None)

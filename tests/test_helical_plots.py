@@ -46,6 +46,7 @@ def test_both_flanks_show_the_same_lines():
         np.testing.assert_allclose(total[np.isfinite(total)], whole, rtol=1e-12)
 
 
+@pytest.mark.slow
 def test_a_pair_carries_load_for_longer_than_its_slices():
     mesh, cycle = solved()
     ax = plot.load_sharing({"helical": cycle})

@@ -49,7 +49,10 @@ def two_stages(first, second, direction="counterclockwise", angle=100.0):
     return Gearbox(shafts, [GearMesh("p1", "w1", 20.0), GearMesh("p2", "w2", angle)], None, direction)
 
 
-@pytest.mark.parametrize("first, second, direction", [(15.0, 10.0, "counterclockwise"), (15.0, -10.0, "clockwise")])
+@pytest.mark.parametrize(
+    "first, second, direction",
+    [(15.0, 10.0, "counterclockwise"), pytest.param(15.0, -10.0, "clockwise", marks=pytest.mark.slow)],
+)
 def test_the_gearbox_is_in_equilibrium(first, second, direction):
     """Bearings, couplings and the load from outside, in all six directions, about the left end of the first shaft."""
     box = two_stages(first, second, direction)

@@ -49,6 +49,7 @@ def housed():
     return stage(Housing(NODES, stiffness()))
 
 
+@pytest.mark.slow
 def test_no_compliance_is_no_housing(housed):
     """Exactly with a compliance of zero, in the limit with a stiffness that grows."""
     bare = stage()

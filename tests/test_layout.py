@@ -96,6 +96,7 @@ def load_on(face, line=None):
     return annex_e(face, torque=face.torque, wheel=(line or FlankLine()).modification, stations=STATIONS)
 
 
+@pytest.mark.slow
 def test_flank_line_of_skewed_rigid_axes_is_their_opposite():
     line = level_load(rigid_face(20.0))
     np.testing.assert_allclose([line.slope, line.crowning], [-20.0, 0.0], atol=1e-9)
@@ -298,6 +299,7 @@ def softened(radial):
     )
 
 
+@pytest.mark.slow
 def test_usual_shafts_have_no_finding_and_slips_of_a_unit_do(layout):
     (thick,) = findings_of(layout, SUPPORT)  # a bore of 40 mm on a shaft of 45 mm
     assert (thick.key, thick.where, thick.value) == ("shaft diameter over bore", 'gear "w2"', 45.0 / 40.0)
@@ -525,6 +527,7 @@ def test_longest_life_beats_its_neighbours_and_every_single_layout(bent):
     np.testing.assert_allclose([alone.slope, alone.crowning], [-9.0, 0.0], atol=1e-2)
 
 
+@pytest.mark.slow
 def test_layout_for_a_duty_cycle_tells_relative_lives(bent):
     """At the largest torque that it is run at."""
     load = jg.LoadSpectrum.from_hours([60.0, 180.0, 600.0], [3000.0, 20.0, 0.0], [1000.0, 500.0, 500.0])

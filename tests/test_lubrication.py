@@ -385,6 +385,7 @@ def test_without_load_slopes_through_the_contact_are_finite(with_slope):
     assert values[:7] == pytest.approx(1000.0) and np.isfinite(values).all() and np.isfinite(slopes).all()
 
 
+@pytest.mark.slow
 def test_without_load_nothing_fails_and_slopes_are_finite(mesh, solve):
     """Numbers that are not finite are those of failed contacts, which count as the worst of all."""
     still, light = relieved(mesh, 0.0, POINT[2]), relieved(mesh, 1e-3, POINT[2])

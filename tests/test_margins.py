@@ -174,6 +174,7 @@ def test_absurd_traced_gears_have_finite_margins_and_derivatives():
         assert np.isfinite(found.values).all() and np.isfinite(found.slopes).all()
 
 
+@pytest.mark.slow
 def test_a_search_by_gradients_is_held_by_the_margins():
     """The largest contact ratio over shift, addendum, centre distance: longer and longer teeth, closer and closer."""
 

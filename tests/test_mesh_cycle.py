@@ -215,6 +215,7 @@ def test_fewest_pairs_give_the_same_results(mesh):
     np.testing.assert_allclose(same.transmission_error, wide.transmission_error, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_contact_beyond_the_pairs_carried_along_is_not_converged(sliced):
     torque = 50.0 * float(np.min(sliced.outer_gap)) / 4.0  # 4 um is less than the deflection at 50 N m
     cycle = solve(sliced, torque)  # of two pairs
@@ -266,6 +267,7 @@ def in_plane(mesh):
     return known | {"auto": mesh}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("plane", ["auto", "stress", "strain"])
 def test_structure_matrix_is_symmetric_positive_definite(plane, in_plane):
     structure = np.asarray(in_plane[plane].structure).transpose(2, 0, 1)
@@ -273,6 +275,7 @@ def test_structure_matrix_is_symmetric_positive_definite(plane, in_plane):
     assert np.linalg.eigvalsh(structure).min() > 0
 
 
+@pytest.mark.slow
 def test_plane_strain_is_stiffer_and_a_gear_lies_between(in_plane):
     stress, strain, between = (
         np.asarray(solve(in_plane[plane], 50.0).transmission_error) for plane in ("stress", "strain", "auto")

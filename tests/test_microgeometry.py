@@ -423,7 +423,7 @@ def test_a_flank_table_is_exact_at_its_points_linear_over_the_face_and_constant_
     assert table.varies_along_face
 
 
-@pytest.mark.parametrize("method", ["linear", "natural_cubic", "monotonic"])
+@pytest.mark.parametrize("method", [pytest.param("linear", marks=pytest.mark.slow), "natural_cubic", "monotonic"])
 def test_derivatives_of_a_flank_table(method):
     """By amounts, roll lengths and face coordinates against central differences, forward and reverse."""
     amount = np.random.default_rng(4).normal(size=(5, 3))

@@ -91,6 +91,7 @@ def test_result_of_teeth_belongs_to_its_parameters(mesh, optimum):
     assert float(optimum.wheel.length) == pytest.approx(optimum.parameters["length"])
 
 
+@pytest.mark.slow
 def test_progress_only_improves(searched):
     result, looks = searched
     assert looks[-1][0] == looks[-1][1] == 2 * 40  # two rounds
@@ -134,7 +135,7 @@ METHODS = [
     pytest.param(jg.optimize.LBFGS(starts=2, steps=36), marks=pytest.mark.slow),
     pytest.param(jg.optimize.CMAES(population=32, generations=15), marks=pytest.mark.slow),
     pytest.param(jg.optimize.DifferentialEvolution(population=32, generations=25), marks=pytest.mark.slow),
-    jg.optimize.Genetic(population=32, generations=30),
+    pytest.param(jg.optimize.Genetic(population=32, generations=30), marks=pytest.mark.slow),
     jg.optimize.BinaryGenetic(population=32, generations=150),
 ]
 

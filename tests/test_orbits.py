@@ -161,6 +161,7 @@ def two_gears(mass=2.0):
     )
 
 
+@pytest.mark.slow
 def test_gears_that_turn_freely_have_the_orbit_of_their_equivalent_mass():
     """Momentum is conserved: two more multipliers of one, and nothing that Newton's method could solve for."""
     both = find_orbit(two_gears(), frequency(0.9), ([1.3, -0.7], [1.0, -0.6]), steps=FEW)

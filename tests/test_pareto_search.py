@@ -116,6 +116,7 @@ def three_within(known, most, **options):
     return known.pareto(known.parabolas, BOX, objectives=(*VOLUME, "max_relief"), constraints=[limit], method=method)
 
 
+@pytest.mark.slow
 def test_three_objectives_within_a_limit(known, volume_per_amount):
     result = front = three_within(known, -4.0)
     assert front.values.shape[1] == 3

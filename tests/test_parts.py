@@ -37,6 +37,7 @@ def half():
     return mesh_of(COARSE)
 
 
+@pytest.mark.slow
 def test_parts_together_are_the_mesh(fine):
     whole, divided = solved(fine), [solved(part) for part in parts(fine, COARSE)]
     assert len(divided) == COUNT
@@ -72,6 +73,7 @@ def assert_doubled(mesh, twice):
         np.testing.assert_allclose(solved(each).transmission_error, error[first::2], rtol=1e-9)
 
 
+@pytest.mark.slow
 def test_a_mesh_half_a_position_later_doubles_the_positions(half, fine):
     assert_doubled(half, fine)
 

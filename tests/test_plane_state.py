@@ -98,6 +98,7 @@ hubs_of = eqx.filter_jit(lambda compliance, sides: compliance.hub(*loads_of(side
 structure_of = eqx.filter_jit(lambda compliance, sides: jnp.sum(compliance.structure(*loads_of(sides)), axis=0))
 
 
+@pytest.mark.slow
 def test_each_gear_lies_between_by_its_own_root_chord():
     """Element by element, tooth and body, over its own face width, of which the wheel's overhangs the load by 6 mm at
     both ends and helps to carry it. The contact is in plane strain."""

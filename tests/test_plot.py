@@ -295,6 +295,7 @@ def test_face_load_starts_at_an_even_load():
     assert not ax.texts
 
 
+@pytest.mark.slow
 def test_shafts_lie_where_their_gears_mesh_and_name_their_deflection():
     box = gearbox()
     panels = plot.shaft_deflection(box)

@@ -78,6 +78,7 @@ def test_an_unknown_name_is_a_key_error_with_the_nearest_one():
     assert "max_pressure" not in quantities and quantities.get("max_pressure") is None
 
 
+@pytest.mark.slow
 def test_the_vocabulary_is_the_same_whatever_was_imported_first():
     """A name of a package that nobody has imported is known, and tables and guides list all in one order."""
     code = (

@@ -133,7 +133,9 @@ def waves(amplitude, order, phase=30.0, teeth=Z2) -> TeethDeviations:
     return TeethDeviations(np.zeros(teeth), undulations=[Undulation(amplitude, order, phase)])
 
 
-@pytest.mark.parametrize(("order", "name"), [(1, "wheel shaft order"), (37, "wheel ghost order")])
+@pytest.mark.parametrize(
+    ("order", "name"), [pytest.param(1, "wheel shaft order", marks=pytest.mark.slow), (37, "wheel ghost order")]
+)
 def test_waves_around_a_gear_are_lines_at_their_order(order, name):
     """All flanks move alike: an eccentric gear gives its shaft order alone, a ghost order is no side band."""
     teeth = (Teeth(wheel=waves(amount, order)) for amount in (0.5, 0.0))

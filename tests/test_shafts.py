@@ -254,6 +254,7 @@ def check_of_elastic_lines(box, names, middle):
     assert np.ptp(found) > 0.3
 
 
+@pytest.mark.slow
 def test_influence_and_gap_are_what_the_elastic_lines_show():
     check_of_elastic_lines(single(back=15.0, stiffer=1, force=(300.0, 200.0, 0.0)), ("in", "out"), 60.0)
 

@@ -75,6 +75,7 @@ def test_sizes_by_position_keep_their_order():
     assert jg.Resolution(8, 6, 3, 1) == jg.Resolution(positions=8, slices=6, pairs=3, contact_nodes=1)
 
 
+@pytest.mark.slow
 def test_slices_fill_the_face(mesh):
     width, middle = np.asarray(mesh.slice_width), np.asarray(mesh.face_coordinate)
     np.testing.assert_allclose(width, 1.8 * np.asarray(UNEVEN), rtol=1e-14)

@@ -76,6 +76,7 @@ def test_a_kick_finds_the_orbit_of_two_cycles():
     assert float(kicked.force_harmonics[i, 0]) > 1.0 and float(at_rest.force_harmonics[i, 0]) == 0.0
 
 
+@pytest.mark.slow
 def test_runs_in_one_program_are_those_of_one_each():
     runs = {"up": Run("up"), "down": Run("down"), "kicked": Run("down", 4.5), "kicks": Run("down", None, KICKS)}
     found = speed_runs(rectangular(), SPEEDS, runs, steps=STEPS)
@@ -86,6 +87,7 @@ def test_runs_in_one_program_are_those_of_one_each():
     assert found["up"].dynamic_factor[3] < found["down"].dynamic_factor[3]
 
 
+@pytest.mark.slow
 def test_results_do_not_depend_on_the_number_of_steps():
     chosen = speed_sweep(rectangular(), SPEEDS, steps=steps_for(rectangular(), SPEEDS))
     for name in ("dynamic_factor", "dte_rms", "force_harmonics", "velocity_harmonics"):
@@ -95,6 +97,7 @@ def test_results_do_not_depend_on_the_number_of_steps():
             np.testing.assert_allclose(coarse, fine, rtol=1e-3)
 
 
+@pytest.mark.slow
 def test_the_orbit_is_foreseen_before_the_motion_has_settled():
     """Deviations fade by exp(-2 pi zeta / Omega) per cycle: from one to the tolerance takes 18 Omega / (2 pi zeta)."""
     zeta, cycles, unique = 0.01, 60, (OMEGA >= 0.45) & (OMEGA <= 1.0)

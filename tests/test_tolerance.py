@@ -160,7 +160,9 @@ def of_every_kind(distribution):
     ("distribution", "deviation"),
     # variance of a normal distribution cut off at a: 1 - 2 a phi(a) / (2 Phi(a) - 1)
     [
-        (jg.tolerance.TruncatedNormal(), np.sqrt(1 - 6 * 0.00443185 / 0.9973002) / 3),
+        pytest.param(
+            jg.tolerance.TruncatedNormal(), np.sqrt(1 - 6 * 0.00443185 / 0.9973002) / 3, marks=pytest.mark.slow
+        ),
         (jg.tolerance.Uniform(), 1 / np.sqrt(3)),
     ],
     ids=["normal", "uniform"],
@@ -316,6 +318,7 @@ def test_monte_carlo_holds_the_samples_of_its_seed(mesh, tolerance):
     assert str(scatter).startswith("Scatter of 20 samples, 0 failed")
 
 
+@pytest.mark.slow
 def test_one_compilation_serves_every_number(mesh, tolerance, nothing_compiled, monkeypatch):
     module, traces = importlib.import_module("jaxgear.sweeps.monte_carlo"), []
     solve_number = module._solve_number

@@ -350,6 +350,7 @@ def test_hours_become_shares_of_the_revolutions_by_the_speed(mesh):
     np.testing.assert_array_equal(given.loads.torque, expected.loads.torque)
 
 
+@pytest.mark.slow
 def test_the_flanks_of_a_life_give_its_mesh_again(mesh, relieved):
     pinion, wheel = relieved.flanks()
     assert isinstance(pinion, jg.TabulatedProfile)
