@@ -60,6 +60,7 @@ def test_scipy_solves_the_same_physics(problem, expected):
     np.testing.assert_allclose(ScipyKernel(problem).ppte(VARIANTS), expected, rtol=0, atol=1e-9)
 
 
+@pytest.mark.slow
 @needs_compiler
 def test_c_solves_the_same_physics(problem, expected):
     found = CKernel(problem).ppte(VARIANTS)

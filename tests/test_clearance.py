@@ -42,6 +42,7 @@ def test_no_clearance_is_no_clearance():
     np.testing.assert_allclose(bearing_reactions(beam((0.0, 0.0))).shaft, bare.shaft, rtol=1e-9)
 
 
+@pytest.mark.slow
 def test_the_tangent_is_the_change_of_the_state():
     """Under an even load of the mesh, H f + gap changes with the torque by H times the change of f."""
     points, weights = np.polynomial.legendre.leggauss(len(Y))

@@ -81,13 +81,16 @@ def oscillator_of(mesh, height):
     return SETTINGS.oscillator(mesh, TORQUE, pinion=relief, wheel=relief)
 
 
+numbers_of = Dynamics.numbers  # which a test below replaces
+
+
 @eqx.filter_jit
 def along(oscillator, way):
     """Numbers of what vibrates, and the slopes of two of them along a change of its own numbers."""
     moving, rest = eqx.partition(oscillator, eqx.is_inexact_array)
 
     def of(moving):
-        found = SETTINGS.numbers(eqx.combine(moving, rest))
+        found = numbers_of(SETTINGS, eqx.combine(moving, rest))
         return jnp.stack([found.dynamic_factor, found.dte_rms]), found
 
     return jax.jvp(of, (moving,), (way,), has_aux=True)
@@ -105,7 +108,6 @@ def nearby(mesh):
     return several, way
 
 
-@pytest.mark.slow
 def test_slopes_along_a_change_of_what_vibrates_are_those_of_differences(mesh, nearby):
     """Of the mesh force by the relief, at every speed of every run."""
     several, way = nearby

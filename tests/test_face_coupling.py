@@ -262,6 +262,7 @@ def test_without_coupling_nothing_of_it_is_there():
         assert off.coupling is None and not off.resolution.is_coupled
 
 
+@pytest.mark.slow
 def test_misalignment_is_a_slope_of_the_flank_and_no_support_is_none(mesh, sloped):
     """Beyond the path of contact a misalignment counts as an approach does, by the lever of the corner."""
     rigid = mesh_of(RigidSupport(mesh.pair, Misalignment(direct=20.0)))

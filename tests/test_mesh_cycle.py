@@ -223,6 +223,7 @@ def test_contact_beyond_the_pairs_carried_along_is_not_converged(sliced):
     assert np.all(solve(prepare(gear_pair(), resolution=FOUR_PAIRS), torque).converged)
 
 
+@pytest.mark.slow
 def test_high_contact_ratio_needs_three_pairs():
     cycle = solve(prepare(high_contact_ratio_pair(), resolution=FOUR_PAIRS), 60.0)
     loaded = np.sum(np.asarray(cycle.line_load)[:, 0] > 0, axis=0)

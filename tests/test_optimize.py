@@ -136,7 +136,7 @@ METHODS = [
     pytest.param(jg.optimize.CMAES(population=32, generations=15), marks=pytest.mark.slow),
     pytest.param(jg.optimize.DifferentialEvolution(population=32, generations=25), marks=pytest.mark.slow),
     pytest.param(jg.optimize.Genetic(population=32, generations=30), marks=pytest.mark.slow),
-    jg.optimize.BinaryGenetic(population=32, generations=150),
+    pytest.param(jg.optimize.BinaryGenetic(population=32, generations=150), marks=pytest.mark.slow),
 ]
 
 

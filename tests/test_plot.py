@@ -397,6 +397,7 @@ def test_save_writes_a_report_sized_png_and_closes_the_figure(cycles, tmp_path):
     assert not plt.fignum_exists(figure.number)
 
 
+@pytest.mark.slow
 def test_imports_leave_matplotlib_alone():
     """The library needs no matplotlib until something is drawn, and drawing changes no setting of its user."""
     program = """
