@@ -12,12 +12,11 @@ from jaxgear.contact import OperatingPoint
 from jaxgear.contact.mesh import parts
 from jaxgear.metrics import Lubricant, Strength
 from jaxgear.optimize import SLP, Genetic, Pareto, refine, verdict
-from jaxgear.optimize.evaluate import scores
 from jaxgear.optimize.goal import FEASIBLE, counted
 from jaxgear.optimize.linear_model import Linearizer
 from jaxgear.optimize.problem import make_problem
 from jaxgear.optimize.refine import at_more_positions, fine_enough
-from jaxgear.optimize.search import Record
+from jaxgear.optimize.search import Record, scores
 
 KNOWN = {"amount": 9.0, "length": 4.2}  # keeps every limit below that can be kept
 

@@ -389,6 +389,11 @@ def parts(mesh: Mesh, positions: int) -> list[Mesh]:
     return [_part(np.asarray(first), count, mesh) for first in range(count)]
 
 
+def at_position(mesh: Mesh, place: Array) -> Mesh:
+    """The mesh of the position of this number alone."""
+    return _part(place, mesh.resolution.positions, mesh)
+
+
 @program
 def _part(first: Array | np.ndarray, count: int, mesh: Mesh) -> Mesh:
     """Every so many positions from the first one on."""
@@ -402,7 +407,7 @@ def _part(first: Array | np.ndarray, count: int, mesh: Mesh) -> Mesh:
     taken = jax.tree.map(take, _by_position(mesh))
     taken[0] = taken[0] / count  # as far out, over larger steps
     phase = moving.first_phase + first.astype(moving.first_phase.dtype) / positions
-    resolution = replace(moving.resolution, positions=positions // count)
+    resolution = changed(moving.resolution, positions=positions // count)
     moved = replace(moving, first_phase=phase, resolution=resolution)
     return eqx.tree_at(lambda m: [*_by_position(m), m.kinematics], mesh, [*taken, moved])
 

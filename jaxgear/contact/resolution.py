@@ -6,7 +6,7 @@ from math import gcd
 import equinox as eqx
 import numpy as np
 
-from ..numerics import Checked, Given, check, count, number, whole
+from ..numerics import Checked, Given, changed, check, count, number, whole
 
 _SLIDING_NODES = 3  # a parabola
 _SLIDE_STEPS = 2
@@ -126,8 +126,7 @@ class Resolution(Checked):
     @property
     def of_arrays(self) -> "Resolution":
         """What the arrays of a prepared mesh depend on, all else at its default: one program makes them for many."""
-        sizes = self.positions, self.slices, self.pairs
-        plain = Resolution(*sizes, slice_widths=self.parts, extended_contact=self.extended_contact)
+        plain = self._plain(slice_widths=self.parts, extended_contact=self.extended_contact)
         if self.slices == 1:
             return plain
         modes = self.face_modes if self.coupled_slices else plain.face_modes
@@ -137,13 +136,17 @@ class Resolution(Checked):
     def of_material(self) -> "Resolution":
         """What the material depends on that is removed from the flanks of a prepared mesh, likewise."""
         nodes, steps = self.contact_nodes, self.chosen_slide_steps
-        return Resolution(self.positions, self.slices, self.pairs, nodes, steps, slice_widths=self.parts)
+        return self._plain(contact_nodes=nodes, slide_steps=steps, slice_widths=self.parts)
 
     @property
     def of_contact(self) -> "Resolution":
         """What the contact of a prepared mesh depends on once that material is known, likewise."""
         steps, rtol = self.newton_steps, self.rtol
-        return Resolution(self.positions, self.slices, self.pairs, newton_steps=steps, rtol=rtol)
+        return self._plain(newton_steps=steps, rtol=rtol)
+
+    def _plain(self, **sizes: object) -> "Resolution":
+        """All else at its default; unchecked, since a mesh at a single position has fewer than anybody may ask for."""
+        return changed(Resolution(), positions=self.positions, slices=self.slices, pairs=self.pairs, **sizes)
 
     @property
     def leading(self) -> int:

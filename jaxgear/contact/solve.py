@@ -397,8 +397,10 @@ def _sliding_gain(mesh: Mesh, shift) -> Float[Array, "2 slices"]:
 def _solve_removed(mesh: Mesh, torque: Scalar, removed: RemovedMaterial) -> dict[str, Array]:
     force = _force(mesh, torque)
     removed = jax.tree.map(lambda field: field.astype(force.dtype), removed)
-    gap = stored(over_slices(mesh.corner_gap) + removed.amount)
-    contact = contact_of(mesh, gap, stored(removed.shift), load=force)
+    # stored, or a compiler works the material out again for the few places that the status looks at
+    removed = RemovedMaterial(stored(removed.amount), stored(removed.shift), removed.relative_curvature)
+    gap = over_slices(mesh.corner_gap) + removed.amount
+    contact = contact_of(mesh, gap, removed.shift, load=force)
     solution, windup = contact.solution, mesh.hub * force / mesh.pair.face_width
     unloaded = minimum(contact.gap / over_slices(mesh.lever), axis=(0, 1))
     status = contact_status(mesh, contact, solution.approach, removed)

@@ -114,6 +114,10 @@ class AbstractReduction(ABC):
         """The factors (a, b) of the pieces of `sign` times the number; None where it is not made of pieces."""
         return None
 
+    def extremes(self) -> tuple[int, int] | None:
+        """Factors of the largest and of the smallest value where their sum is the number; None where it is not."""
+        return None
+
 
 @dataclass(frozen=True)
 class Value(AbstractReduction):
@@ -140,6 +144,9 @@ class Max(AbstractReduction):
     def factors(self, sign: int) -> tuple[float, float] | None:
         return (1.0, 0.0) if sign > 0 else None
 
+    def extremes(self) -> tuple[int, int] | None:
+        return 1, 0
+
 
 @dataclass(frozen=True)
 class Min(AbstractReduction):
@@ -154,6 +161,9 @@ class Min(AbstractReduction):
     def factors(self, sign: int) -> tuple[float, float] | None:
         return (-1.0, 0.0) if sign < 0 else None
 
+    def extremes(self) -> tuple[int, int] | None:
+        return 0, 1
+
 
 @dataclass(frozen=True)
 class Range(AbstractReduction):
@@ -167,6 +177,9 @@ class Range(AbstractReduction):
 
     def factors(self, sign: int) -> tuple[float, float] | None:
         return (1.0, 1.0) if sign > 0 else None
+
+    def extremes(self) -> tuple[int, int] | None:
+        return 1, -1
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,7 @@ from ..numerics import CVaR as CVaR
 from ..numerics import Mean as Mean
 from ..numerics import Quantile as Quantile
 from ..numerics import Worst as Worst
+from .evaluate import evaluate as evaluate
 from .free_form import Projection as Projection
 from .free_form import free_form as free_form
 from .free_form import project as project

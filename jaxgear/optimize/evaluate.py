@@ -1,54 +1,149 @@
-"""Start points of a search, and true scores of many designs for methods that follow no gradient."""
+"""Quantities of a design, differentiated only at the mesh positions that decide them.
 
+A peak-to-peak value is that of two positions, the largest pressure that of one. What the contact does at a position
+depends on that position alone, so that the derivatives of such a quantity need the analysis of a few positions beside
+the value from all of them.
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any, NamedTuple, overload
+
+import equinox as eqx
 import jax
 import jax.numpy as jnp
-import numpy as np
 from jaxtyping import Array, Float
 
-from ..conditions.join import padded, side_by_side
-from ..numerics import halton, kernel
-from .goal import counted
-from .problem import Problem, Score
+from ..conditions import solved
+from ..contact import Mesh, MeshCycle, OperatingPoint, solve
+from ..contact.mesh import at_position
+from ..contact.operating_point import Torque, operating_point_of
+from ..contact.solve import check_mesh, flanks_of
+from ..metrics import AbstractSettings, Analysis, Quantity, share_settings
+from ..microgeometry import AbstractModification
+from ..numerics.programs import is_eager
+from ..vocabulary import quantity_of
+
+Scalar = Float[Array, ""]
+One = str | Quantity | Callable[[MeshCycle], Any]
+Several = list[One] | tuple[One, ...]
 
 
-def start_points(problem: Problem, count: int) -> np.ndarray:
-    """The middle of the box, then a Halton sequence: deterministic, so that a design file always gives one answer."""
-    points = halton(len(problem.names), count)
-    points[0] = 0.5
-    return points.astype(np.dtype(problem.low.dtype))
+class _Given(NamedTuple):
+    """What a design is analyzed from."""
+
+    mesh: Mesh
+    operating_point: OperatingPoint
+    pinion: AbstractModification
+    wheel: AbstractModification
+    settings: tuple[AbstractSettings, ...]
+
+    def analysis(self) -> Analysis:
+        """The analysis of the design."""
+        cycle = solve(self.mesh, self.operating_point, pinion=self.pinion, wheel=self.wheel)
+        return Analysis(cycle, self.mesh, self.settings)
 
 
-def points_nearby(point: np.ndarray, count: int, *, reach: float, seed: int) -> np.ndarray:
-    """A Halton sequence in the cube of so much reach about a point of the unit box, moved inside where it sticks out.
+@overload
+def evaluate(
+    quantities: One,
+    mesh: Mesh,
+    torque: Torque,
+    *,
+    pinion: AbstractModification | None = None,
+    wheel: AbstractModification | None = None,
+) -> Scalar: ...
 
-    Every seed gives other points, always the same.
+
+@overload
+def evaluate(
+    quantities: Several,
+    mesh: Mesh,
+    torque: Torque,
+    *,
+    pinion: AbstractModification | None = None,
+    wheel: AbstractModification | None = None,
+) -> tuple[Scalar, ...]: ...
+
+
+def evaluate(
+    quantities: One | Several,
+    mesh: Mesh,
+    torque: Torque,
+    *,
+    pinion: AbstractModification | None = None,
+    wheel: AbstractModification | None = None,
+) -> Scalar | tuple[Scalar, ...]:
+    """Quantities of one design under one torque, whose derivatives cost little.
+
+    The numbers and their derivatives of any order, in either mode, are those of the quantities of `solve`. Where all
+    quantities are a largest or a smallest value of positions, or both as PPTE is, they are differentiated at the
+    positions that decide them alone: value and gradient of PPTE take half the time of those through `solve`.
+
+        slope = jax.grad(lambda amount: evaluate("ppte", mesh, 50.0, pinion=jg.TipRelief(amount, 4.0)))(7.0)
+
+    Args:
+        quantities: name, `Quantity` or function of a mesh cycle; or a list of them.
+        mesh: prepared mesh.
+        torque: on the pinion [N m], scalar; or an `OperatingPoint`.
+        pinion: modification of the pinion flank; None for the nominal involute.
+        wheel: modification of the wheel flank; None for the nominal involute.
+
+    Returns:
+        the number, or a tuple with that of each; NaN where the contact is not solved at every position. While anything
+        is traced no pairs are added to the mesh, as in `solve`.
+
+    Raises:
+        TypeError, ValueError: as `solve` does; for a quantity that is not known or lacks its settings, and for none.
     """
-    corner = np.clip(point - reach, 0.0, 1.0 - 2 * reach)
-    return corner + 2 * reach * halton(len(point), count, seed)
+    check_mesh("evaluate", mesh)
+    several = quantities if isinstance(quantities, list | tuple) else [quantities]
+    if not several:
+        raise ValueError("evaluate: quantities is empty, give at least one")
+    wanted, settings = share_settings([quantity_of(each, "evaluate") for each in several])
+    operating_point = operating_point_of("evaluate", torque, mesh.slice_width.dtype)
+    given = _Given(mesh, operating_point, *flanks_of("evaluate", mesh, pinion, wheel), settings)
+    if is_eager() or not all(each.local and each.reduction.extremes() for each in wanted):
+        numbers = _numbers(wanted, given)
+    else:
+        numbers = _of_extremes(wanted, given._replace(mesh=replace(mesh, automatic=False)))
+    return numbers if several is quantities else numbers[0]
 
 
-def real_points(problem: Problem, points: np.ndarray | Array) -> jax.Array:
-    """Points of the unit box in the type of the problem."""
-    return jnp.asarray(points, problem.low.dtype)
+def _numbers(wanted: tuple[Quantity, ...], given: _Given) -> tuple[Scalar, ...]:
+    analysis = given.analysis()
+    fine = solved(analysis.cycle)
+    return tuple(jnp.where(fine, of(analysis), jnp.nan) for of in wanted)
 
 
-_INFEASIBLE = 1e6  # rank of a design that passes a limit, above any objective
+@eqx.filter_custom_jvp
+def _of_extremes(wanted: tuple[Quantity, ...], given: _Given) -> tuple[Scalar, ...]:
+    return _numbers(wanted, given)
 
 
-def scores(problem: Problem, points: np.ndarray | Array) -> Score:
-    """Scores of points of the unit box, leading axis (points,), in batches that fit the cache."""
-    count = len(points)
-    batch = min(side_by_side(problem.mesh, problem.cases.count), count)
-    return jax.tree.map(lambda part: part[:count], _scores(problem, real_points(problem, padded(points, batch)), batch))
+@_of_extremes.def_jvp
+def _of_extremes_jvp(primals: tuple[Any, ...], tangents: tuple[Any, ...]) -> tuple[Any, Any]:
+    (wanted, given), (_, along) = primals, tangents
+    analysis = given.analysis()
+    fine, count = solved(analysis.cycle), given.mesh.resolution.positions
+    numbers, shares, entries = [], [], []
+    for of in wanted:
+        values = of.values(analysis).ravel()
+        numbers.append(jnp.where(fine, of.reduction(values), jnp.nan))
+        for factor, place in zip(of.reduction.extremes(), (jnp.argmax, jnp.argmin)):
+            if factor:
+                shares.append((of, factor))
+                entries.append(place(values))
 
+    def at(entry: Array, given: _Given) -> Array:
+        there = given._replace(mesh=at_position(given.mesh, entry % count)).analysis()
+        return jnp.stack([of.values(there).ravel()[entry // count] for of in wanted])
 
-@kernel
-def _scores(problem: Problem, points, batch: int) -> Score:
-    return jax.lax.map(problem.score, points, batch_size=batch)
+    def decided(given: _Given) -> tuple[Scalar, ...]:
+        found = jax.vmap(at, (0, None))(jnp.stack(entries), given)
+        return tuple(
+            sum(factor * row[number] for (of, factor), row in zip(shares, found) if of is each)
+            for number, each in enumerate(wanted)
+        )
 
-
-def fitness(score: Score) -> Float[Array, " designs"] | Float[Array, ""]:
-    """One number to rank by: the objective, and far above any of them the violation."""
-    value, excess = score.value[..., 0], counted(score.violation)
-    rank = jnp.where(excess > 0, _INFEASIBLE * (1 + excess), value)
-    return jnp.where(jnp.isfinite(value), rank, jnp.inf)
+    return tuple(numbers), eqx.filter_jvp(decided, (given,), (along,))[1]

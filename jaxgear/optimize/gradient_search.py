@@ -12,10 +12,9 @@ import numpy as np
 from jaxtyping import Array
 
 from ..numerics import Checked, count, kernel
-from .evaluate import real_points, start_points
 from .goal import counted
-from .problem import GRADIENT_COST, Problem
-from .search import AbstractMethod, Record
+from .problem import GRADIENT_COST, Problem, real_points
+from .search import AbstractMethod, Record, start_points
 
 # Widths of the soft extremes in the stages of a search, relative to the best objective among the start points: from
 # wide, where most positions pull, to narrow, where the soft objective is within about a percent of the true one.

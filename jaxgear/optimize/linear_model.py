@@ -19,10 +19,9 @@ import scipy
 from ..conditions.join import padded
 from ..contact.mesh import later, parts
 from ..numerics import AbstractMeasure, CVaR, Worst, kernel, program
-from .evaluate import real_points
 from .goal import FEASIBLE
 from .linearization import Linearization, Pieces
-from .problem import Problem
+from .problem import Problem, real_points
 
 
 class Linearizer:

@@ -13,13 +13,12 @@ from ..numerics import AbstractMeasure, Callback, halton
 from ..numerics.fields import Checked, count
 from ..numerics.pareto import pareto_front
 from ..tolerance import Tolerance
-from .evaluate import start_points
 from .goal import Constraint, Objective, counted
 from .linear_model import AbstractScalarization, Linearizer, LinearModel
 from .problem import Problem, make_problem
 from .refine import POSITIONS, at_more_positions, fine_enough, on_finer_meshes, seek_limits
 from .result import Front
-from .search import Record
+from .search import Record, start_points
 from .slp import Search, follow
 from .verdict import PROBE, optimum_of
 

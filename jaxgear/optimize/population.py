@@ -15,9 +15,8 @@ import numpy as np
 from ..numerics import decoded, next_generation, random_strings, whole
 from ..numerics.fields import Checked, count, number
 from ..sweeps import FullFactorial
-from .evaluate import fitness
 from .problem import Problem
-from .search import AbstractMethod, Record
+from .search import AbstractMethod, Record, fitness
 
 _LEAST_POPULATION, _MOST = 4, 100_000
 # Mutation of the genetic algorithm: standard deviation in the unit box, falling geometrically over the generations so

@@ -257,6 +257,11 @@ def _worst(excess):
     return jnp.maximum(maximum(excess), 0.0) if excess.size else jnp.zeros((), excess.dtype)
 
 
+def real_points(problem: Problem, points: np.ndarray | Array) -> jax.Array:
+    """Points of the unit box in the type of the problem."""
+    return jnp.asarray(points, problem.low.dtype)
+
+
 def goals_of(
     objectives: Sequence[Quantity], constraints: Sequence[Constraint]
 ) -> tuple[tuple[Quantity, ...], tuple[Constraint, ...], tuple[AbstractSettings, ...]]:

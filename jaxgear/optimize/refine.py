@@ -8,11 +8,10 @@ import numpy as np
 
 from ..contact import Mesh, prepare
 from ..numerics import whole
-from .evaluate import points_nearby, scores, start_points
 from .goal import FEASIBLE, counted
 from .linear_model import Linearizer, LinearModel, NoObjective
 from .problem import Problem
-from .search import Record
+from .search import Record, points_nearby, scores, start_points
 from .slp import Ledger, Search, follow
 
 POSITIONS = 512

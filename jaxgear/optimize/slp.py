@@ -6,11 +6,10 @@ from typing import Protocol
 import numpy as np
 
 from ..numerics.fields import Checked, count, number
-from .evaluate import points_nearby, start_points
 from .goal import FEASIBLE
 from .linear_model import AbstractScalarization, Linearizer, LinearModel
 from .problem import Problem
-from .search import AbstractMethod, Record
+from .search import AbstractMethod, Record, points_nearby, start_points
 
 # Reach of the start points of a later round about the best design, in the unit box. The kinks of PPTE make many shallow
 # local optima close together; on the 19/48 pair they lie within a tenth of the range.
