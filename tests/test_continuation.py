@@ -97,6 +97,7 @@ def test_the_parametric_resonance_lies_between_two_flips(parametric):
     assert (np.asarray(parametric.orbits.contact_loss_share) == 0).all()
 
 
+@pytest.mark.slow
 def test_orbits_of_two_cycles_join_both_flips(parametric, doubled):
     assert doubled.ended == "joined"
     upper = parametric.bifurcations[1].parameter

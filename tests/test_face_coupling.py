@@ -285,6 +285,7 @@ def table_of(pair, scale=1e-3):
     return TabulatedSupport(pair, matrix, 3.0 * y + 2.0)
 
 
+@pytest.mark.slow
 def test_support_is_that_of_the_dense_matrix(mesh, on_table):
     """The constant part of the support is an approach of its own, what tilts levels the load."""
     given = on_table.support

@@ -63,6 +63,7 @@ def test_line_loads_of_the_pairs_add_up():
     np.testing.assert_allclose(np.sum(pairs, axis=0), whole, rtol=1e-12)
 
 
+@pytest.mark.slow
 def test_other_pictures_are_those_of_spur_gears_in_the_limit():
     (mesh, nearly), (_, spur) = solved(1e-6), solved(None)
     for draw in (plot.pressure, plot.load_sharing):

@@ -307,6 +307,7 @@ def test_profiles_follow_the_flank_lines(file, tmp_path):
     assert kinds == ["lead_slope", "lead_crowning", "tip_relief"]
 
 
+@pytest.mark.slow
 def test_the_file_is_the_script(file):
     """What the command finds is what the library finds for the same gearbox; a mesh angle turns the plane of action."""
     design = load_design(file(FILE))

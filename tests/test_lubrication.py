@@ -423,6 +423,7 @@ def test_force_excitation_is_the_force_between_gears_that_turn_uniformly(mesh):
 # slopes, batches, settings
 
 
+@pytest.mark.slow
 def test_slopes_are_those_of_differences(mesh):
     """Of cycles that change with torque and relief as their own differences do."""
     at, step = np.array(POINT), 1e-5

@@ -248,6 +248,7 @@ def test_stiffness_harmonic_of_order_two_is_unstable_at_omega_zero():
         parametric_instability(state, order=7)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sign, orders", [(1, (13.0, 7.0)), (-1, (33.0, 13.0))])
 def test_combination_resonance_is_asymptotic(sign, orders):
     """Two excitations at 13 and 7 or 33 and 13 twentieths of the resonance that neither of them meets."""

@@ -81,6 +81,7 @@ def test_derivatives_by_the_gaps_follow_from_those_under_load(loaded):
     np.testing.assert_allclose(jax.jit(jax.grad(load))(DATA.gap), expected, rtol=1e-9, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_without_contact_loads_and_derivatives_are_exactly_zero():
     """From far apart to almost touching."""
     touching = jnp.min(DATA.gap / DATA.lever[:, None], axis=(0, 1))

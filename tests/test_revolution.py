@@ -102,6 +102,7 @@ def test_loaded_pairs_share_as_in_a_solution_by_hand():
     assert shares[[2, 4]].min() > 1.05 and np.ptp(np.delete(shares, [2, 3, 4])) < 1e-9
 
 
+@pytest.mark.slow
 def test_flanks_of_single_teeth_are_those_of_whole_gears_in_their_rows():
     slopes = 4.0 * np.sin(np.arange(Z2))
     listed = TeethDeviations(np.zeros(Z2), [jg.ProfileSlope(slope) for slope in slopes])
@@ -133,9 +134,8 @@ def waves(amplitude, order, phase=30.0, teeth=Z2) -> TeethDeviations:
     return TeethDeviations(np.zeros(teeth), undulations=[Undulation(amplitude, order, phase)])
 
 
-@pytest.mark.parametrize(
-    ("order", "name"), [pytest.param(1, "wheel shaft order", marks=pytest.mark.slow), (37, "wheel ghost order")]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize(("order", "name"), [(1, "wheel shaft order"), (37, "wheel ghost order")])
 def test_waves_around_a_gear_are_lines_at_their_order(order, name):
     """All flanks move alike: an eccentric gear gives its shaft order alone, a ghost order is no side band."""
     teeth = (Teeth(wheel=waves(amount, order)) for amount in (0.5, 0.0))

@@ -188,6 +188,7 @@ def single(angle=0.0, exit_at=0.0, direction="counterclockwise", wheel_at=60.0, 
     return Gearbox([into, out], [GearMesh("p", "w", angle)], direction=direction)
 
 
+@pytest.mark.slow
 def test_influence_is_that_of_a_simple_beam_and_a_bar_in_torsion():
     """Deflection under the force in the middle, and r_b^2 times the twist from the end where the torque comes in."""
     s = 60.0 + np.asarray(Y)

@@ -221,6 +221,7 @@ def test_meshes_of_equal_widths_are_those_of_none():
         np.testing.assert_array_equal(one, other)
 
 
+@pytest.mark.slow
 def test_uniform_flanks_load_all_slices_alike(mesh):
     many = jg.solve(mesh, TORQUE)
     assert bool(many.converged.all())
@@ -275,6 +276,7 @@ def test_plots_have_the_slices(mesh):
     plt.close("all")
 
 
+@pytest.mark.slow
 def test_support_gives_way_under_the_forces_of_the_slices():
     """A parabola over the face, which three polynomials hold exactly."""
     given = Bent(pair_of(), Misalignment(direct=20.0))

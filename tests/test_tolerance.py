@@ -156,13 +156,12 @@ def of_every_kind(distribution):
     return jg.Tolerance(gear, gear, misalignment=2.0, distribution=distribution)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("distribution", "deviation"),
     # variance of a normal distribution cut off at a: 1 - 2 a phi(a) / (2 Phi(a) - 1)
     [
-        pytest.param(
-            jg.tolerance.TruncatedNormal(), np.sqrt(1 - 6 * 0.00443185 / 0.9973002) / 3, marks=pytest.mark.slow
-        ),
+        (jg.tolerance.TruncatedNormal(), np.sqrt(1 - 6 * 0.00443185 / 0.9973002) / 3),
         (jg.tolerance.Uniform(), 1 / np.sqrt(3)),
     ],
     ids=["normal", "uniform"],

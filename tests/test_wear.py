@@ -655,6 +655,7 @@ def test_teeth_that_are_worn_through_are_told(mesh):
             assert bool(through(mesh.pair, lengths, depth)) == gone
 
 
+@pytest.mark.slow
 def test_what_is_worn_through_is_not_worn_on(mesh):
     """A slip of four powers of ten in the coefficient ends after some blocks, with numbers up to there."""
     blocks = []

@@ -85,6 +85,7 @@ def test_the_error_of_the_pressure_is_that_of_the_grid_or_more():
     assert (away < 1.2 * np.array(errors[:2])).all() and away[1] < 0.01 * pressures[2] < 0.02 * pressures[2] < away[0]
 
 
+@pytest.mark.slow
 def test_a_limit_that_is_never_reached_is_no_failure(mesh):
     """Not finite values are those of failed contacts, which count as the worst of all."""
     life = SETTINGS.history(mesh, TORQUE, pinion=NONE, wheel=NONE, deviation=PERFECT)
