@@ -176,7 +176,7 @@ def carried(problem, load):
 own_deflection = jax.jit(lambda law, load: law.secant(jnp.maximum(load, 1e-9)))
 
 
-@pytest.mark.parametrize("held", [False, pytest.param(True, marks=pytest.mark.slow)], ids=["rigid", "support"])
+@pytest.mark.parametrize("held", [False, True], ids=["rigid", "support"])
 def test_solution_meets_the_conditions_of_the_dense_problem(mesh, on_table, held):
     """Of rough flanks that touch on some of the slices only."""
     prepared = on_table if held else mesh

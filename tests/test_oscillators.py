@@ -127,7 +127,6 @@ def test_runs_in_diffrax_and_agrees_with_the_steps():
     np.testing.assert_allclose(end[1], solution.ys[1][-1], rtol=1e-7)
 
 
-@pytest.mark.slow
 def test_two_gears_vibrate_as_the_torsional_model_and_stiff_bearings_do_not_change_it():
     speeds, steps = [1200.0, 2600.0], 1024
     alone = speed_sweep(made(), speeds, steps=steps)

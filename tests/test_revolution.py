@@ -102,7 +102,6 @@ def test_loaded_pairs_share_as_in_a_solution_by_hand():
     assert shares[[2, 4]].min() > 1.05 and np.ptp(np.delete(shares, [2, 3, 4])) < 1e-9
 
 
-@pytest.mark.slow
 def test_flanks_of_single_teeth_are_those_of_whole_gears_in_their_rows():
     slopes = 4.0 * np.sin(np.arange(Z2))
     listed = TeethDeviations(np.zeros(Z2), [jg.ProfileSlope(slope) for slope in slopes])

@@ -221,7 +221,6 @@ def test_meshes_of_equal_widths_are_those_of_none():
         np.testing.assert_array_equal(one, other)
 
 
-@pytest.mark.slow
 def test_uniform_flanks_load_all_slices_alike(mesh):
     many = jg.solve(mesh, TORQUE)
     assert bool(many.converged.all())
