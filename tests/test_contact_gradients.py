@@ -142,8 +142,8 @@ AT_CORNERS = pytest.mark.parametrize(
         pytest.param(two_springs, (100.0, 0.0, 0.0), id="equal gaps"),
         pytest.param(two_springs, (100.0, 0.0, 1e4), id="full separation"),
         pytest.param(two_springs, (1e-12, 0.0, 0.0), id="vanishing load"),
-        pytest.param(linear_pair, (100.0, 0.0, 5.0), id="kissing"),
-        pytest.param(linear_pair, (0.0, 2.0, 2.0), id="no load, both touching"),
+        pytest.param(linear_pair, (100.0, 0.0, 5.0), id="kissing", marks=pytest.mark.slow),
+        pytest.param(linear_pair, (0.0, 2.0, 2.0), id="no load, both touching", marks=pytest.mark.slow),
     ],
 )
 

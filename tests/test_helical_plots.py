@@ -15,6 +15,7 @@ WIDTH, BASE_ANGLE = 20.0, 14.0761  # mm, deg
 AHEAD = WIDTH * np.tan(np.deg2rad(BASE_ANGLE))  # of one end of the face on the path of contact
 
 
+@pytest.mark.slow
 def test_contact_lines_run_across_the_plane_of_action():
     mesh, cycle = solved()
     ax = plot.pressure_map(cycle)

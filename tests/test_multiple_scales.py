@@ -71,6 +71,7 @@ def test_expansion_about_the_loaded_mean(load, mean, frequency, quadratic, cubic
     assert np.allclose(numbers, wanted, atol=6e-7, rtol=0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "torque, frequency, scales, integrated",
     [(0.01, 0.98733, 0.168182, 0.168757), (0.01, 0.94144, 0.088422, 0.091449), (0.02, 0.97636, 0.336364, 0.340964)],
