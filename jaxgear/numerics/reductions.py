@@ -114,10 +114,6 @@ class AbstractReduction(ABC):
         """The factors (a, b) of the pieces of `sign` times the number; None where it is not made of pieces."""
         return None
 
-    def extremes(self) -> tuple[int, int] | None:
-        """Factors of the largest and of the smallest value where their sum is the number; None where it is not."""
-        return None
-
 
 @dataclass(frozen=True)
 class Value(AbstractReduction):
@@ -144,9 +140,6 @@ class Max(AbstractReduction):
     def factors(self, sign: int) -> tuple[float, float] | None:
         return (1.0, 0.0) if sign > 0 else None
 
-    def extremes(self) -> tuple[int, int] | None:
-        return 1, 0
-
 
 @dataclass(frozen=True)
 class Min(AbstractReduction):
@@ -161,9 +154,6 @@ class Min(AbstractReduction):
     def factors(self, sign: int) -> tuple[float, float] | None:
         return (-1.0, 0.0) if sign < 0 else None
 
-    def extremes(self) -> tuple[int, int] | None:
-        return 0, 1
-
 
 @dataclass(frozen=True)
 class Range(AbstractReduction):
@@ -177,9 +167,6 @@ class Range(AbstractReduction):
 
     def factors(self, sign: int) -> tuple[float, float] | None:
         return (1.0, 1.0) if sign > 0 else None
-
-    def extremes(self) -> tuple[int, int] | None:
-        return 1, -1
 
 
 @dataclass(frozen=True)

@@ -103,11 +103,17 @@ def evaluate(
     wanted, settings = share_settings([quantity_of(each, "evaluate") for each in several])
     operating_point = operating_point_of("evaluate", torque, mesh.slice_width.dtype)
     given = _Given(mesh, operating_point, *flanks_of("evaluate", mesh, pinion, wheel), settings)
-    if is_eager() or not all(each.local and each.reduction.extremes() for each in wanted):
+    if is_eager() or not all(each.local and _pieces(each) for each in wanted):
         numbers = _numbers(wanted, given)
     else:
         numbers = _of_extremes(wanted, given._replace(mesh=replace(mesh, automatic=False)))
     return numbers if several is quantities else numbers[0]
+
+
+def _pieces(of: Quantity) -> tuple[int, float, float] | None:
+    """Sign and factors of the pieces that a quantity is made of; None where it needs every value."""
+    both = ((sign, of.reduction.factors(sign)) for sign in (1, -1))
+    return next(((sign, *factors) for sign, factors in both if factors is not None), None)
 
 
 def _numbers(wanted: tuple[Quantity, ...], given: _Given) -> tuple[Scalar, ...]:
@@ -130,10 +136,13 @@ def _of_extremes_jvp(primals: tuple[Any, ...], tangents: tuple[Any, ...]) -> tup
     for of in wanted:
         values = of.values(analysis).ravel()
         numbers.append(jnp.where(fine, of.reduction(values), jnp.nan))
-        for factor, place in zip(of.reduction.extremes(), (jnp.argmax, jnp.argmin)):
-            if factor:
-                shares.append((of, factor))
-                entries.append(place(values))
+        sign, above, below = _pieces(of) or (1, 0.0, 0.0)
+        if above:
+            shares.append((of, sign * above))
+            entries.append(jnp.argmax(above * values))
+        if below:
+            shares.append((of, -sign * below))
+            entries.append(jnp.argmin(below * values))
 
     def at(entry: Array, given: _Given) -> Array:
         there = given._replace(mesh=at_position(given.mesh, entry % count)).analysis()
