@@ -14,6 +14,7 @@ from jaxtyping import Array, Bool, Float
 
 from ..contact import Mesh, MeshCycle, removed_material, solve_removed
 from ..contact.operating_point import Torque, operating_point_of
+from ..contact.slide import nominal_material
 from ..contact.solve import flanks_of
 from ..contact.status import Status, Statuses, status_of
 from ..microgeometry import AbstractModification, NoModification
@@ -105,11 +106,12 @@ class Variants(Checked):
         def made(values, mesh):
             whole = self if mesh is None else eqx.tree_at(lambda tree: tree.mesh, self, mesh)
             variant = whole(values)
+            first = variant.cases.first
             both = flanks_of("removed_material", variant.mesh, variant.pinion, variant.wheel)
-            # at the nominal contacts, which is traced in a tenth of the time of where they slide to
-            removed = [modification(flank) for modification, flank in zip(both, variant.mesh.flanks())]
+            # where the contacts slide to takes longer to trace
+            removed = nominal_material(variant.mesh, first.torque.astype(variant.mesh.slice_width.dtype), *both)
             own = None if mesh is not None else (variant.mesh, variant.cases)
-            return removed, variant.cases.first, eqx.filter(own, eqx.is_array)
+            return removed, first, eqx.filter(own, eqx.is_array)
 
         mesh = self.mesh if isinstance(self.mesh, Mesh) else None
         closed, _, _ = eqx.filter_make_jaxpr(made)(tuple(values), mesh)
