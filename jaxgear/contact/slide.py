@@ -54,6 +54,7 @@ Scalar = Float[Array, ""]
 Load = Float[Array, "pairs slices positions"]
 Field = Float[Array, "pairs #slices positions"]
 Real = Float[Array, "..."]
+Mask = Bool[Array, "..."]
 Own = tuple[AbstractModification, AbstractModification]
 
 
@@ -200,27 +201,30 @@ def _near_rest(sided_terms: Sequence[Sided], place: Place, steps: int) -> _Near:
     terms, at = jax.tree.map(single, (list(sided_terms), place))
     bulge = 1e3 / at.radius
     shift = jnp.zeros(jax.eval_shape(lambda: _slope(at.radius, terms, at)).shape, "float32")
-    below = above = _Tried(shift, shift, jnp.zeros(shift.shape, bool))
-    for _ in range(steps):
+
+    def try_again(_: int, state: tuple[Real, _Tried, _Tried, Mask]) -> tuple[Real, _Tried, _Tried, Mask]:
+        shift, below, above, fell = state
         slope = stored(_slope(shift, terms, at))
         falls = slope < 0
-        before, other = _chosen(falls, below, above), _chosen(falls, above, below)
-        other = _Tried(other.shift, jnp.where(before.last, 0.5 * other.slope, other.slope), jnp.zeros_like(falls))
+        here, other = _Tried(shift, slope), _chosen(falls, above, below)
+        other = _Tried(other.shift, jnp.where(falls == fell, 0.5 * other.slope, other.slope))
         apart = shift - other.shift
         across = (slope - other.slope) / jnp.where(apart != 0, apart, 1.0)
-        here = _Tried(shift, slope, jnp.ones_like(falls))
-        below, above = _chosen(falls, here, other), _chosen(falls, other, here)
         shift = stored(shift - slope / jnp.where((other.slope != 0) & (across > bulge), across, bulge))
+        return shift, _chosen(falls, here, other), _chosen(falls, other, here), falls
+
+    nothing = _Tried(shift, shift)
+    # a loop is compiled once
+    shift, below, above, _ = jax.lax.fori_loop(0, steps, try_again, (shift, nothing, nothing, shift < 0))
     found = (shift, *_either(below, above), _curvature(shift, terms, at))
     return _Near(*(each.astype(place.radius.dtype) for each in found))
 
 
 class _Tried(NamedTuple):
-    """A shift that was tried [mm], the slope there [um/mm], and whether it was the last one; zeros before that."""
+    """A shift that was tried [mm] and the slope there [um/mm]; zeros before there is one."""
 
     shift: Real
     slope: Real
-    last: Bool[Array, "..."]
 
 
 def _either(below: _Tried, above: _Tried) -> tuple[Real, Real]:
@@ -230,7 +234,7 @@ def _either(below: _Tried, above: _Tried) -> tuple[Real, Real]:
     return jnp.where(both, low, -jnp.inf), jnp.where(both, high, jnp.inf)
 
 
-def _chosen(first: Bool[Array, "..."], one: _Tried, other: _Tried) -> _Tried:
+def _chosen(first: Mask, one: _Tried, other: _Tried) -> _Tried:
     return jax.tree.map(partial(jnp.where, first), one, other)
 
 
