@@ -12,8 +12,7 @@ from jax.experimental import checkify
 
 import jaxgear as jg
 from jaxgear.contact import removed_material
-from jaxgear.contact.contact_width import place_of, terms_of
-from jaxgear.contact.slide import _slope, nominal_material
+from jaxgear.contact.slide import nominal_material
 from jaxgear.geometry import reduced_radius
 from jaxgear.microgeometry import NoModification
 
@@ -137,17 +136,6 @@ def test_the_gap_is_the_least_of_a_fine_search(mesh, name):
     assert (nominal - found)[near].max() > 4 * tolerance
 
 
-@pytest.mark.parametrize("dtype, left", [("float64", 1e-10), ("float32", 0.02)])
-def test_contacts_rest_where_the_slope_is_zero(mesh, dtype, left):
-    """On a kinked relief, within rounding of slopes of up to 10 um/mm, corners included."""
-    mesh = jax.tree.map(lambda leaf: leaf.astype(dtype) if eqx.is_inexact_array(leaf) else leaf, mesh)
-    torque, (pinion, wheel, _) = jnp.asarray(TORQUE, dtype), FLANKS["kinked"]
-    found = removed_material(mesh, torque, pinion=pinion, wheel=wheel)
-    assert found.shift.dtype == dtype and np.abs(found.shift).max() > 0.05
-    slope = _slope(found.shift, terms_of(mesh, dtype, pinion, wheel), place_of(mesh, torque))
-    assert np.abs(slope).max() < left
-
-
 @pytest.mark.slow
 def test_more_steps_go_on_towards_the_search(mesh):
     """A relief as steep as they come: 15 um over a millimetre."""
@@ -160,8 +148,8 @@ def test_more_steps_go_on_towards_the_search(mesh):
     sizes = replace(SLIDING, slide_steps=1)
     moved = eqx.tree_at(lambda m: m.kinematics, mesh, eqx.tree_at(lambda k: k.resolution, mesh.kinematics, sizes))
     none = worst(nominal_material(mesh, jnp.asarray(TORQUE), steep, steep))
-    one, four = (worst(removed_material(each, TORQUE, pinion=steep, wheel=steep).amount) for each in (moved, mesh))
-    assert none > 2.0 and none > one > 1.0 and four < 0.03
+    one, two = (worst(removed_material(each, TORQUE, pinion=steep, wheel=steep).amount) for each in (moved, mesh))
+    assert none > 2.0 and one < 0.5 * none and two < 0.1
 
 
 def test_a_concave_or_convex_flank_changes_the_pressure(mesh):
@@ -315,4 +303,4 @@ def test_a_prescribed_error_gives_the_forces_of_the_cycle(mesh):
 def test_points_across_the_contact_have_to_see_a_slope():
     with pytest.raises(ValueError, match="slide_steps = 1 needs contact_nodes >= 3, is 2"):
         jg.Resolution(contact_nodes=2, slide_steps=1)
-    assert jg.Resolution(contact_nodes=1).chosen_slide_steps == 0 and jg.Resolution().chosen_slide_steps == 4
+    assert jg.Resolution(contact_nodes=1).chosen_slide_steps == 0 and jg.Resolution().chosen_slide_steps == 2

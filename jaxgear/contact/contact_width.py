@@ -119,17 +119,18 @@ def terms_of(mesh: Mesh, dtype: np.dtype, pinion: AbstractModification, wheel: A
 
 def varies_along_profile(sided: Sided, place: Place) -> bool:
     """Whether a term has other values along the profile than across the face: its array then has those axes."""
-    number, term = sided
-    shape = eqx.filter_eval_shape(lambda: term(flank_at(place.sides[number], jnp.zeros_like(place.radius)))).shape
+    side, term = sided
+    shape = eqx.filter_eval_shape(lambda: term(flank_at(side, place, jnp.zeros_like(place.radius)))).shape
     return shape[0] > 1 or shape[-1] > 1
 
 
-def flank_at(side: PlaceSide, moved: Real) -> Flank:
+def flank_at(number: int, place: Place, moved: Real) -> Flank:
     """Points of one gear's flank at a distance from the nominal contact, towards the pinion tip [mm]."""
+    side = place.sides[number]
     # arc length of an involute: ds = rho / r_b d rho
     roll_length = side.roll_length + side.direction * moved * (side.base_radius / side.roll_length)
     return Flank(
-        roll_length=jnp.where(roll_length > 0, roll_length, 0.0),
+        roll_length=jnp.maximum(roll_length, 0.0),
         tip_roll_length=side.tip_roll_length,
         start_roll_length=side.start_roll_length,
         base_radius=side.base_radius,
@@ -169,31 +170,33 @@ class Probe(NamedTuple):
 
 
 def probe(sided_terms: Sequence[Sided], place: Place, moved: Real, nodes: tuple[Node, ...]) -> Probe:
-    inverse, (places, *shares) = 1 / place.half_width, zip(*nodes)
-    each = [_moments(term, moved, place.sides[side], place.half_width, places, shares) for side, term in sided_terms]
+    inverse = 1 / place.half_width
+    each = []
+    for side, term in sided_terms:
+        points = [flank_at(side, place, moved + node.place * place.half_width) for node in nodes]
+        each.append(_moments(term, points, [list(node[1:]) for node in nodes]))
     mean, slope, curvature = (reduce(add, parts) for parts in zip(*each))
     return Probe(mean, slope * inverse, curvature * inverse**2)
 
 
+@by_numbers
+def _moments(
+    term: AbstractModification, points: Sequence[Flank], shares: Sequence[Sequence[float]]
+) -> tuple[Array, ...]:
+    sums: list[Any] = [0.0] * len(shares[0])
+    for point, weights in zip(points, shares):
+        removed = term(point)
+        sums = [total + weight * removed for total, weight in zip(sums, weights)]
+    return tuple(sums)
+
+
 def secant_slope(sided_terms: Sequence[Sided], place: Place, moved: Real) -> Real:
     """Slope of the removed material [um/mm] over the middle half of a contact that has moved from its nominal place."""
-    ends, shares = (-0.5, 0.5), [(-1.0, 1.0)]
-    each = [_moments(term, moved, place.sides[side], place.half_width, ends, shares)[0] for side, term in sided_terms]
+    half, each = 0.5 * place.half_width, []
+    for side, term in sided_terms:
+        points = [flank_at(side, place, end) for end in (moved - half, moved + half)]
+        each.append(_moments(term, points, [[-1.0], [1.0]])[0])
     return reduce(add, each) / place.half_width
-
-
-@by_numbers(entrywise=(1,))
-def _moments(
-    term: AbstractModification,
-    moved: Real,
-    side: PlaceSide,
-    half_width: Real,
-    places: Sequence[float],
-    shares: Sequence[Sequence[float]],
-) -> tuple[Array, ...]:
-    """Sums of the removed material at places relative to the half width, one for each of several shares of them."""
-    removed = [term(flank_at(side, moved + place * half_width)) for place in places]
-    return tuple(reduce(add, [weight * each for weight, each in zip(weights, removed)]) for weights in shares)
 
 
 def _half_width(mesh: Mesh, torque: Scalar, line_load: Real | None) -> Float[Array, "pairs #slices positions"]:

@@ -9,12 +9,12 @@ the mean taken over the contact with the weight of the Hertzian pressure. Beyond
 touches, o away from the virtual centre of the contact; there, and before the corner on the path, u cannot pass the
 corner. A slope s moves the virtual centre by -R s and lets the gap fall by R s^2 / 2.
 
-The contact rests where the slope over its middle, with that of the bulge, is zero. A search in single precision comes
-near, a step of Newton's method gets there, and the derivatives of any order follow from what stays zero (implicit
-function theorem). The mean at rest gives the least gap. Of steep, short reliefs, whose slope jumps to and fro, two
-places in a thousand are not found to rounding; their derivatives are then near ones. Against a fine search with more
-points the gap is off by 0.03 um on reliefs and crowning, 0.1 um on a root relief of 8 um over 1.5 mm, and 0.3 um on a
-table that jumps by several um from millimetre to millimetre (19/48, module 3).
+The slope over the middle of the contact leads from place to place; a least gap that lies between two of them is sought
+there. At the last place the points across the contact give mean, slope and curvature of c by least squares with the
+weight of the pressure, which kinks and corners of a table do not upset, and the parabola through them gives the least
+gap. Against a fine search with more points the gap is off by 0.03 um on reliefs and crowning, 0.1 um on a root relief
+of 8 um over 1.5 mm, and 0.3 um on a table that jumps by several um from millimetre to millimetre (19/48, module 3).
+Everything is differentiated as it is computed, so that derivatives of any order belong to these very numbers.
 
 Finite elements have no width of their own: what their contacts meet of a relief follows from the load that each of them
 carries. Where the structure is as accurate as that, it shows: on steep reliefs the wider mean makes PPTE up
@@ -22,19 +22,18 @@ to 9 % too small, and the loaded width leaves 2.5 % at worst.
 """
 
 from collections.abc import Callable, Sequence
-from functools import partial
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Bool, Float
+from jaxtyping import Array, Float
 
 from ..compliance import default_compliance
 from ..geometry import GearPair
 from ..microgeometry import AbstractModification, NoModification
-from ..numerics import Checked, Numbers, changed, jvp_of_given, program, real, result, stored
+from ..numerics import Checked, Numbers, changed, program, real, result, stored
 from .contact_width import (
     Node,
     Place,
@@ -54,14 +53,7 @@ Scalar = Float[Array, ""]
 Load = Float[Array, "pairs slices positions"]
 Field = Float[Array, "pairs #slices positions"]
 Real = Float[Array, "..."]
-Mask = Bool[Array, "..."]
 Own = tuple[AbstractModification, AbstractModification]
-
-
-# Share of the curvature of the bulge below which there is no least gap to lead to.
-_LEAST_CURVATURE = 0.1
-# By how much the least gap may lie beyond what single precision says [mm]: far above its rounding.
-_SLACK = 1e-3
 
 
 class RemovedMaterial(Checked):
@@ -148,7 +140,7 @@ def _slid(place: Place, sided: Sequence[Sided], sizes: Resolution, pairs: int) -
     along = [each for each, slopes in given if slopes]  # what the contact slides down
     amount = jnp.zeros((pairs, sizes.slices, sizes.positions), place.radius.dtype)
     for side, term in (each for each, slopes in given if not slopes):
-        amount = amount + term(flank_at(place.sides[side], jnp.zeros_like(place.radius)))
+        amount = amount + term(flank_at(side, place, jnp.zeros_like(place.radius)))
     if not along:
         flat = jnp.zeros((pairs, 1, sizes.positions), amount.dtype)
         return RemovedMaterial(amount, flat, flat)
@@ -158,105 +150,65 @@ def _slid(place: Place, sided: Sequence[Sided], sizes: Resolution, pairs: int) -
 
 def _slide(sided_terms: Sequence[Sided], place: Place, nodes: tuple[Node, ...], steps: int) -> tuple[Real, Real, Real]:
     """Amount [um], shift [mm] and relative curvature of `RemovedMaterial`, of the shape that the terms have."""
-    bulge, shift = 1e3 / place.radius, jnp.zeros_like(place.radius)
-    moved = shift
+    bulge = 1e3 / place.radius
+    moved = shift = jnp.zeros_like(place.radius)
+    tried: tuple[_Tried, ...] = ()
     if steps:
-        shift = stored(_rest(_near_rest(sided_terms, place, steps), sided_terms, place))
-        moved = _moved(shift, place)
+        shift = stored(-secant_slope(sided_terms, place, moved) / bulge)
+        tried = (_Tried(moved, -bulge * (place.beyond + shift)),)
+        moved = _within(place.beyond + shift, place.lowest, place.highest)
+    for _ in range(steps - 1):
+        slope = bulge * (moved - place.beyond) + secant_slope(sided_terms, place, moved)
+        total = _curvature(slope, jnp.zeros_like(slope), moved, tried, place)
+        shift = stored(moved - slope / total - place.beyond)
+        tried, moved = (*tried, _Tried(moved, slope)), _within(place.beyond + shift, place.lowest, place.highest)
     seen = probe(sided_terms, place, moved, nodes)
-    amount = 0.5 * bulge * ((moved - place.beyond) ** 2 - place.beyond**2) + seen.mean
+    away = moved - place.beyond
+    amount = 0.5 * bulge * (away**2 - place.beyond**2) + seen.mean
+    if steps:
+        amount = amount - _gain(bulge * away + seen.slope, seen.curvature, moved, tried, place)
     return amount, shift, seen.curvature / bulge
 
 
-def _moved(shift: Real, place: Place) -> Real:
-    """Place of a contact on its flank [mm], which no corner passes."""
-    return _within(place.beyond + shift, place.lowest, place.highest)
-
-
-def _slope(shift: Real, sided_terms: Sequence[Sided], place: Place) -> Real:
-    """Slope of bulge and removed material together [um/mm]; zero where the contact is at rest."""
-    return 1e3 / place.radius * shift + secant_slope(sided_terms, place, _moved(shift, place))
-
-
-class _Near(NamedTuple):
-    """A shift near that of the least gap, between which it lies [mm], and the curvature there [um/mm^2]."""
-
-    shift: Real
-    low: Real
-    high: Real
-    curvature: Real
-
-
-def _near_rest(sided_terms: Sequence[Sided], place: Place, steps: int) -> _Near:
-    """Where the gap is about least, by a search in single precision, without derivatives.
-
-    A parabola leads from try to try, at first that of the bulge. Between tries with slopes of either sign its curvature
-    is at least what both tell, of an end that stays a second time with half its slope (Illinois; M. Dowell, P. Jarratt,
-    BIT 11, 1971).
-    """
-
-    def single(leaf: Any) -> Any:
-        return jax.lax.stop_gradient(leaf).astype("float32") if eqx.is_inexact_array(leaf) else leaf
-
-    terms, at = jax.tree.map(single, (list(sided_terms), place))
-    bulge = 1e3 / at.radius
-    shift = jnp.zeros(jax.eval_shape(lambda: _slope(at.radius, terms, at)).shape, "float32")
-
-    def try_again(_: int, state: tuple[Real, _Tried, _Tried, Mask]) -> tuple[Real, _Tried, _Tried, Mask]:
-        shift, below, above, fell = state
-        slope = stored(_slope(shift, terms, at))
-        falls = slope < 0
-        here, other = _Tried(shift, slope), _chosen(falls, above, below)
-        other = _Tried(other.shift, jnp.where(falls == fell, 0.5 * other.slope, other.slope))
-        apart = shift - other.shift
-        across = (slope - other.slope) / jnp.where(apart != 0, apart, 1.0)
-        shift = stored(shift - slope / jnp.where((other.slope != 0) & (across > bulge), across, bulge))
-        return shift, _chosen(falls, here, other), _chosen(falls, other, here), falls
-
-    nothing = _Tried(shift, shift)
-    # a loop is compiled once
-    shift, below, above, _ = jax.lax.fori_loop(0, steps, try_again, (shift, nothing, nothing, shift < 0))
-    found = (shift, *_either(below, above), _curvature(shift, terms, at))
-    return _Near(*(each.astype(place.radius.dtype) for each in found))
-
-
 class _Tried(NamedTuple):
-    """A shift that was tried [mm] and the slope there [um/mm]; zeros before there is one."""
+    """A place where the contact was tried [mm], and the slope of the gap there [um/mm]."""
 
-    shift: Real
+    moved: Real
     slope: Real
 
 
-def _either(below: _Tried, above: _Tried) -> tuple[Real, Real]:
-    """Between which shifts the slope changes its sign [mm], where both have been seen."""
-    both = (below.slope != 0) & (above.slope != 0)
-    low, high = jnp.minimum(below.shift, above.shift) - _SLACK, jnp.maximum(below.shift, above.shift) + _SLACK
-    return jnp.where(both, low, -jnp.inf), jnp.where(both, high, jnp.inf)
+def _curvature(slope: Real, curvature: Real, moved: Real, tried: tuple[_Tried, ...], place: Place) -> Real:
+    """Curvature of the parabola that leads to the least gap [um/mm^2].
 
-
-def _chosen(first: Mask, one: _Tried, other: _Tried) -> _Tried:
-    return jax.tree.map(partial(jnp.where, first), one, other)
-
-
-@eqx.filter_custom_jvp
-def _rest(near: _Near, sided_terms: Sequence[Sided], place: Place) -> Real:
-    """Shift of the least gap [mm]: the slope is zero there, by a step of Newton's method."""
-    return _within(near.shift - _slope(near.shift, sided_terms, place) / near.curvature, near.low, near.high)
-
-
-@_rest.def_jvp
-def _rest_jvp(primals: tuple[Any, ...], tangents: tuple[Any, ...]) -> tuple[Real, Real]:
-    """The slope stays zero (implicit function theorem); nothing follows from where the search has ended."""
-    shift, (_, *given), (_, *given_dot) = _rest(*primals), primals, tangents
-    _, slope_dot = jvp_of_given(lambda given: _slope(shift, *given), given, given_dot)
-    return shift, -slope_dot / stored(_curvature(shift, *given))
-
-
-def _curvature(shift: Real, sided_terms: Sequence[Sided], place: Place) -> Real:
-    """By how much the slope rises [um/mm^2] where that leads to a least gap, else that of the bulge."""
-    _, rise = jax.jvp(lambda shift: _slope(shift, sided_terms, place), (shift,), (jnp.ones_like(shift),))
+    Where a place that was tried before has a slope of the other sign, the least gap lies between: over a kink the
+    curvature is at least what the slopes of both tell, the latest of such places counting.
+    """
     bulge = 1e3 / place.radius
-    return jnp.where(rise > _LEAST_CURVATURE * bulge, rise, bulge)
+    total = seen = bulge + jnp.maximum(curvature, 0.0)
+    for before in tried:
+        apart = moved - before.moved
+        between = (slope * before.slope < 0) & (apart != 0)
+        across = (slope - before.slope) / jnp.where(between, apart, 1.0)
+        total = jnp.where(between, jnp.maximum(seen, across), total)
+    return total
+
+
+def _gain_of(slope: Real, curvature: Real, moved: Real, tried: tuple[_Tried, ...], place: Place) -> Real:
+    total = _curvature(slope, curvature, moved, tried, place)
+    step = _within(moved - slope / total, place.lowest, place.highest) - moved
+    return -step * (slope + 0.5 * step * total)
+
+
+@jax.custom_jvp
+def _gain(slope: Real, curvature: Real, moved: Real, tried: tuple[_Tried, ...], place: Place) -> Real:
+    """By how much the gap falls with the step that the parabola seen from a place asks for [um]."""
+    return _gain_of(slope, curvature, moved, tried, place)
+
+
+@_gain.defjvp
+def _gain_jvp(primals: tuple[Array, ...], tangents: tuple[Array, ...]) -> tuple[Array, Array]:
+    slope, curvature, *at = primals
+    return _gain(*primals), jax.jvp(_gain_of, (stored(slope), stored(curvature), *at), tangents)[1]
 
 
 def _within(x: Real, low: Real, high: Real) -> Real:

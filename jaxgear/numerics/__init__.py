@@ -41,7 +41,6 @@ from .fits import real_roots as real_roots
 from .implicit import bracketed_root as bracketed_root
 from .implicit import by_numbers as by_numbers
 from .implicit import implicit_root as implicit_root
-from .implicit import jvp_of_given as jvp_of_given
 from .implicit import newton as newton
 from .implicit import solve as solve
 from .implicit import with_jacobian as with_jacobian
