@@ -89,6 +89,8 @@ def test_the_vocabulary_is_the_same_whatever_was_imported_first():
 
     unit, *names = listed("jaxgear.manufacture")
     assert unit == "um" and [unit, *names] == listed("jaxgear.wear") and {"ppte", "wear_depth"} <= set(names)
+    # here too, where other tests may have added their own
+    assert [name for name in quantities if name in names] == names
 
 
 def test_a_quantity_of_your_own_is_as_good_as_one_of_the_vocabulary(cycle):

@@ -109,7 +109,7 @@ class Variants(Checked):
             first = variant.cases.first
             both = flanks_of("removed_material", variant.mesh, variant.pinion, variant.wheel)
             # where the contacts slide to takes longer to trace
-            removed = nominal_material(variant.mesh, first.torque.astype(variant.mesh.slice_width.dtype), *both)
+            removed = nominal_material(variant.mesh, first.torque, *both)
             own = None if mesh is not None else (variant.mesh, variant.cases)
             return removed, first, eqx.filter(own, eqx.is_array)
 
