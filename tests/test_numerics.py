@@ -8,6 +8,7 @@ import pytest
 
 from jaxgear.numerics import (
     bracketed_root,
+    by_numbers,
     check,
     gauss_legendre,
     optional_real,
@@ -68,6 +69,24 @@ def test_roots_at_the_ends_of_the_bracket_keep_their_value():
 
 
 roots_of = jax.jit(real_roots)
+
+
+def test_by_numbers_changes_how_derivatives_are_formed_and_not_what_they_are():
+    """By a number, an array that acts entry by entry along an axis of length one, and one that does not; both modes."""
+
+    def plain(number, entries, mixed):
+        return jnp.sin(number * entries) * jnp.cumsum(mixed)[None]
+
+    given = jnp.asarray(0.7), jnp.linspace(0.5, 1.5, 3)[:, None], jnp.linspace(1.0, 2.0, 4)
+    every = (0, 1, 2)
+
+    def differentiated(function):
+        first = jax.jacfwd(function, every)
+        return function(*given), first(*given), jax.jacrev(first, every)(*given)
+
+    formed = by_numbers(entrywise=(1,))(plain)
+    found, expected = jax.jit(lambda: (differentiated(formed), differentiated(plain)))()
+    jax.tree.map(lambda a, b: np.testing.assert_allclose(a, b, rtol=1e-12, atol=1e-14), found, expected)
 
 
 def test_real_roots_of_a_polynomial_and_their_derivatives():

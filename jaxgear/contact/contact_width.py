@@ -1,4 +1,4 @@
-"""What the contacts see of a modification around a place on the flank: its mean, slope and curvature."""
+"""What the contacts see of a modification around a place on the flank: its mean, curvature and slope."""
 
 from collections.abc import Sequence
 from functools import reduce
@@ -119,18 +119,17 @@ def terms_of(mesh: Mesh, dtype: np.dtype, pinion: AbstractModification, wheel: A
 
 def varies_along_profile(sided: Sided, place: Place) -> bool:
     """Whether a term has other values along the profile than across the face: its array then has those axes."""
-    side, term = sided
-    shape = eqx.filter_eval_shape(lambda: term(flank_at(side, place, jnp.zeros_like(place.radius)))).shape
+    number, term = sided
+    shape = eqx.filter_eval_shape(lambda: term(flank_at(place.sides[number], jnp.zeros_like(place.radius)))).shape
     return shape[0] > 1 or shape[-1] > 1
 
 
-def flank_at(number: int, place: Place, moved: Real) -> Flank:
+def flank_at(side: PlaceSide, moved: Real) -> Flank:
     """Points of one gear's flank at a distance from the nominal contact, towards the pinion tip [mm]."""
-    side = place.sides[number]
     # arc length of an involute: ds = rho / r_b d rho
     roll_length = side.roll_length + side.direction * moved * (side.base_radius / side.roll_length)
     return Flank(
-        roll_length=jnp.maximum(roll_length, 0.0),
+        roll_length=jnp.where(roll_length > 0, roll_length, 0.0),
         tip_roll_length=side.tip_roll_length,
         start_roll_length=side.start_roll_length,
         base_radius=side.base_radius,
@@ -140,14 +139,13 @@ def flank_at(number: int, place: Place, moved: Real) -> Flank:
 
 
 class Node(NamedTuple):
-    """A point across the contact, relative to its half width, and what it weighs in mean, slope and curvature.
+    """A point across the contact, relative to its half width, and what it weighs in mean and curvature.
 
-    Slope and curvature are those of the parabola that fits best with the weight of the pressure.
+    The curvature is that of the parabola that fits best with the weight of the pressure.
     """
 
     place: float
     mean: float
-    slope: float
     curvature: float
 
 
@@ -156,47 +154,37 @@ def contact_nodes(nodes: int) -> tuple[Node, ...]:
     angle = np.pi * np.arange(1, nodes + 1) / (nodes + 1)
     x, mean = np.cos(angle), np.sin(angle) ** 2 * 2 / (nodes + 1)
     square = x**2 - mean @ x**2
-    slope = mean * x / (mean @ x**2) if nodes > 1 else 0 * x
     curvature = 2 * mean * square / (mean @ square**2) if nodes > 2 else 0 * x
-    return tuple(Node(*map(float, row)) for row in zip(x, mean, slope, curvature))
+    return tuple(Node(*map(float, row)) for row in zip(x, mean, curvature))
 
 
-class Probe(NamedTuple):
-    """Removed material around a point of the flank: mean [um], slope [um/mm] and curvature [um/mm^2]."""
-
-    mean: Real
-    slope: Real
-    curvature: Real
-
-
-def probe(sided_terms: Sequence[Sided], place: Place, moved: Real, nodes: tuple[Node, ...]) -> Probe:
-    inverse = 1 / place.half_width
-    each = []
-    for side, term in sided_terms:
-        points = [flank_at(side, place, moved + node.place * place.half_width) for node in nodes]
-        each.append(_moments(term, points, [list(node[1:]) for node in nodes]))
-    mean, slope, curvature = (reduce(add, parts) for parts in zip(*each))
-    return Probe(mean, slope * inverse, curvature * inverse**2)
-
-
-@by_numbers
-def _moments(
-    term: AbstractModification, points: Sequence[Flank], shares: Sequence[Sequence[float]]
-) -> tuple[Array, ...]:
-    sums: list[Any] = [0.0] * len(shares[0])
-    for point, weights in zip(points, shares):
-        removed = term(point)
-        sums = [total + weight * removed for total, weight in zip(sums, weights)]
-    return tuple(sums)
+def probe(sided_terms: Sequence[Sided], place: Place, moved: Real, nodes: tuple[Node, ...]) -> tuple[Real, Real]:
+    """Mean [um] and curvature [um/mm^2] of the removed material around a place on the flank."""
+    places, *shares = zip(*nodes)
+    each = [_moments(term, moved, place.sides[side], place.half_width, places, shares) for side, term in sided_terms]
+    mean, curvature = (reduce(add, parts) for parts in zip(*each))
+    return mean, curvature / place.half_width**2
 
 
 def secant_slope(sided_terms: Sequence[Sided], place: Place, moved: Real) -> Real:
     """Slope of the removed material [um/mm] over the middle half of a contact that has moved from its nominal place."""
-    half, each = 0.5 * place.half_width, []
-    for side, term in sided_terms:
-        points = [flank_at(side, place, end) for end in (moved - half, moved + half)]
-        each.append(_moments(term, points, [[-1.0], [1.0]])[0])
+    ends, shares = (-0.5, 0.5), [(-1.0, 1.0)]
+    each = [_moments(term, moved, place.sides[side], place.half_width, ends, shares)[0] for side, term in sided_terms]
     return reduce(add, each) / place.half_width
+
+
+@by_numbers(entrywise=(1,))
+def _moments(
+    term: AbstractModification,
+    moved: Real,
+    side: PlaceSide,
+    half_width: Real,
+    places: Sequence[float],
+    shares: Sequence[Sequence[float]],
+) -> tuple[Array, ...]:
+    """Sums of the removed material at places relative to the half width, one for each of several shares of them."""
+    removed = [term(flank_at(side, moved + place * half_width)) for place in places]
+    return tuple(reduce(add, [weight * each for weight, each in zip(weights, removed)]) for weights in shares)
 
 
 def _half_width(mesh: Mesh, torque: Scalar, line_load: Real | None) -> Float[Array, "pairs #slices positions"]:

@@ -1,6 +1,6 @@
 """Roots with exact derivatives, of one equation and of a few."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from functools import partial
 from typing import Any, Literal, NamedTuple, ParamSpec, TypeVar, overload
 
@@ -23,12 +23,12 @@ _Tree = TypeVar("_Tree")
 
 
 def jvp_of_given(
-    function: Callable[[_Tree], Result], primal: _Tree, tangent: PyTree[Array | SymbolicZero]
+    function: Callable[[_Tree], Result], primal: _Tree, tangent: PyTree[Array | SymbolicZero | None]
 ) -> tuple[Result, Result]:
-    """`jax.jvp` along those leaves of the tangent that are not symbolically zero: the others cost nothing."""
-    tangents, structure = jax.tree.flatten(tangent, is_leaf=lambda leaf: isinstance(leaf, SymbolicZero))
-    primals = jax.tree.leaves(primal)
-    given = [i for i, leaf in enumerate(tangents) if not isinstance(leaf, SymbolicZero)]
+    """`jax.jvp` along those leaves of the tangent that are neither None nor symbolically zero: others cost nothing."""
+    tangents = jax.tree.leaves(tangent, is_leaf=_nothing)
+    primals, structure = jax.tree.flatten(primal, is_leaf=_nothing)
+    given = [i for i, leaf in enumerate(tangents) if not _nothing(leaf)]
 
     def of_given(leaves):
         everything = list(primals)
@@ -39,34 +39,43 @@ def jvp_of_given(
     return jax.jvp(of_given, ([primals[i] for i in given],), ([tangents[i] for i in given],))
 
 
-def by_numbers(function: Callable[_Given, Result]) -> Callable[_Given, Result]:
-    """The function, with its derivative by every single number of its arguments formed in forward mode.
+def by_numbers(*, entrywise: Collection[int] = ()) -> Callable[[Callable[_Given, Result]], Callable[_Given, Result]]:
+    """Makes functions whose derivative by every single number of their arguments is formed in forward mode.
 
     Reverse mode then keeps one array per number and result, the derivative by it, and none of what led there. That pays
-    where an elementwise chain follows from a few numbers. Arrays of several numbers are differentiated as always.
+    where an elementwise chain follows from a few numbers. The same holds for arrays that act entry by entry. Others are
+    differentiated as always.
+
+    Args:
+        entrywise: places of the arguments each entry of which acts on that entry of the results alone, or on all along
+            an axis of which it has length one.
     """
+
+    def decorate(function: Callable[_Given, Result]) -> Callable[_Given, Result]:
+        return _by_numbers(function, frozenset(entrywise))
+
+    return decorate
+
+
+def _by_numbers(function: Callable[_Given, Result], entrywise: Collection[int]) -> Callable[_Given, Result]:
     wrapped = eqx.filter_custom_jvp(function)
     of_any: Callable[..., Result] = function
 
     def rule(primals, tangents):
         leaves, structure = jax.tree.flatten(tangents, is_leaf=_nothing)
         values = jax.tree.leaves(primals, is_leaf=_nothing)
+        single = [i in entrywise for i, each in enumerate(tangents) for _ in jax.tree.leaves(each, is_leaf=_nothing)]
         moving = [i for i, leaf in enumerate(leaves) if leaf is not None]
-        numbers = [i for i in moving if leaves[i].ndim == 0]
-        arrays = [i for i in moving if leaves[i].ndim > 0]
+        numbers = [i for i in moving if single[i] or leaves[i].ndim == 0]
+        arrays = [i for i in moving if i not in numbers]
 
-        def along(places, directions):
-            def of_moving(moved):
-                everything = list(values)
-                for i, leaf in zip(places, moved):
-                    everything[i] = leaf
-                return of_any(*jax.tree.unflatten(structure, everything))
+        def along(directions):
+            every = jax.tree.unflatten(structure, [directions.get(i) for i in range(len(leaves))])
+            return jvp_of_given(lambda given: of_any(*given), primals, every)[1]
 
-            return jax.jvp(of_moving, ([values[i] for i in places],), (directions,))[1]
-
-        changes = [jax.tree.map(partial(_times, leaves[i]), along([i], [jnp.ones_like(values[i])])) for i in numbers]
+        changes = [jax.tree.map(partial(_times, leaves[i]), along({i: jnp.ones_like(values[i])})) for i in numbers]
         if arrays:
-            changes.append(along(arrays, [leaves[i] for i in arrays]))
+            changes.append(along({i: leaves[i] for i in arrays}))
         return wrapped(*primals), jax.tree.map(lambda *parts: sum(parts), *changes)
 
     wrapped.def_jvp(rule)
@@ -78,7 +87,7 @@ def _times(change, derivative):
 
 
 def _nothing(leaf) -> bool:
-    return leaf is None
+    return leaf is None or isinstance(leaf, SymbolicZero)
 
 
 _BISECTIONS = 24  # the bracket shrinks to 6e-8 of its width, from where two Newton steps reach machine precision
