@@ -156,7 +156,7 @@ def _slide(sided_terms: Sequence[Sided], place: Place, nodes: tuple[Node, ...], 
     tried: tuple[_Tried, ...] = ()
     for _ in range(steps):
         slope = stored(bulge * (moved - place.beyond) + secant_slope(sided_terms, place, moved))
-        shift = stored(_step(slope, moved, tried, bulge) - place.beyond)
+        shift = _step(slope, moved, tried, 1e-3 * place.radius) - place.beyond
         tried, moved = (*tried, _Tried(moved, slope)), _within(place.beyond + shift, place.lowest, place.highest)
     mean, curvature = probe(sided_terms, place, moved, nodes)
     return 0.5 * bulge * ((moved - place.beyond) ** 2 - place.beyond**2) + mean, shift, curvature / bulge
@@ -170,19 +170,19 @@ class _Tried(NamedTuple):
 
 
 @by_numbers(entrywise=range(4))
-def _step(slope: Real, moved: Real, tried: tuple[_Tried, ...], bulge: Real) -> Real:
-    """Where the parabola with the curvature of the bulge, through the slope at a place, leads to [mm].
+def _step(slope: Real, moved: Real, tried: tuple[_Tried, ...], flat: Real) -> Real:
+    """Where the parabola with the curvature of the bulge, `flat` its inverse, leads to from a place [mm].
 
     Where a place that was tried before has a slope of the other sign, the least gap lies between: over a kink the
     curvature is at least what the slopes of both tell, the latest of such places counting.
     """
-    curvature = bulge
+    apart, change = flat, jnp.ones_like(flat)
     for before in tried:
-        apart = moved - before.moved
-        between = (slope * before.slope < 0) & (apart != 0)
-        across = (slope - before.slope) / jnp.where(between, apart, 1.0)
-        curvature = jnp.where(between, jnp.where(across > bulge, across, bulge), curvature)
-    return moved - slope / curvature
+        between = slope * before.slope < 0
+        apart = jnp.where(between, moved - before.moved, apart)
+        change = jnp.where(between, slope - before.slope, change)
+    across = apart / change
+    return moved - slope * jnp.where((across > 0) & (across < flat), across, flat)
 
 
 def _within(x: Real, low: Real, high: Real) -> Real:
