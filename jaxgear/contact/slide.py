@@ -13,7 +13,8 @@ The slope over the middle of the contact leads from place to place; a least gap 
 there. At the last place the points across the contact give mean, slope and curvature of c by least squares with the
 weight of the pressure, which kinks and corners of a table do not upset, and the parabola through them gives the least
 gap. Against a fine search with more points the gap is off by 0.03 um on reliefs and crowning, 0.1 um on a root relief
-of 8 um over 1.5 mm, and 0.3 um on a table that jumps by several um from millimetre to millimetre (19/48, module 3).
+of 8 um over 1.5 mm, and 0.3 um on a table that jumps by several um from millimetre to millimetre (19/48, module 3);
+2 um at the few positions where such a table holds a second least gap and the search ends there.
 Everything is differentiated as it is computed, so that derivatives of any order belong to these very numbers.
 
 Finite elements have no width of their own: what their contacts meet of a relief follows from the load that each of them
