@@ -84,7 +84,7 @@ def test_by_numbers_changes_how_derivatives_are_formed_and_not_what_they_are():
         first = jax.jacfwd(function, every)
         return function(*given), first(*given), jax.jacrev(first, every)(*given)
 
-    formed = by_numbers(entrywise=(1,))(plain)
+    formed = by_numbers(plain, entrywise=(1,))
     found, expected = jax.jit(lambda: (differentiated(formed), differentiated(plain)))()
     jax.tree.map(lambda a, b: np.testing.assert_allclose(a, b, rtol=1e-12, atol=1e-14), found, expected)
 

@@ -1,7 +1,7 @@
 """What the contacts see of a modification around a place on the flank: its mean, slope and curvature."""
 
 from collections.abc import Sequence
-from functools import reduce
+from functools import partial, reduce
 from operator import add
 from typing import Any, NamedTuple
 
@@ -182,7 +182,7 @@ def secant_slope(sided_terms: Sequence[Sided], place: Place, moved: Real) -> Rea
     return reduce(add, each) / place.half_width
 
 
-@by_numbers(entrywise=(1,))
+@partial(by_numbers, entrywise=(1,))
 def _moments(
     term: AbstractModification,
     moved: Real,

@@ -23,6 +23,7 @@ to 9 % too small, and the loaded width leaves 2.5 % at worst.
 """
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import NamedTuple
 
 import equinox as eqx
@@ -179,7 +180,7 @@ class _Tried(NamedTuple):
     slope: Real
 
 
-@by_numbers(entrywise=range(5))
+@partial(by_numbers, entrywise=range(5))
 def _step(slope: Real, curvature: Real, moved: Real, tried: tuple[_Tried, ...], bulge: Real) -> tuple[Real, Real]:
     """Where the parabola that leads to the least gap has it [mm], and its curvature [um/mm^2].
 
@@ -195,7 +196,7 @@ def _step(slope: Real, curvature: Real, moved: Real, tried: tuple[_Tried, ...], 
     return moved - slope / total, total
 
 
-@by_numbers(entrywise=range(7))
+@partial(by_numbers, entrywise=range(7))
 def _gain(
     slope: Real, curvature: Real, moved: Real, tried: tuple[_Tried, ...], bulge: Real, lowest: Real, highest: Real
 ) -> Real:

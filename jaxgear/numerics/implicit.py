@@ -39,25 +39,18 @@ def jvp_of_given(
     return jax.jvp(of_given, ([primals[i] for i in given],), ([tangents[i] for i in given],))
 
 
-def by_numbers(*, entrywise: Collection[int] = ()) -> Callable[[Callable[_Given, Result]], Callable[_Given, Result]]:
-    """Makes functions whose derivative by every single number of their arguments is formed in forward mode.
+def by_numbers(function: Callable[_Given, Result], *, entrywise: Collection[int] = ()) -> Callable[_Given, Result]:
+    """The function, with its derivative by every single number of its arguments formed in forward mode.
 
     Reverse mode then keeps one array per number and result, the derivative by it, and none of what led there. That pays
     where an elementwise chain follows from a few numbers. The same holds for arrays that act entry by entry. Others are
     differentiated as always.
 
     Args:
+        function: of positional arguments.
         entrywise: places of the arguments each entry of which acts on that entry of the results alone, or on all along
             an axis of which it has length one.
     """
-
-    def decorate(function: Callable[_Given, Result]) -> Callable[_Given, Result]:
-        return _by_numbers(function, frozenset(entrywise))
-
-    return decorate
-
-
-def _by_numbers(function: Callable[_Given, Result], entrywise: Collection[int]) -> Callable[_Given, Result]:
     wrapped = eqx.filter_custom_jvp(function)
     of_any: Callable[..., Result] = function
 
