@@ -1,5 +1,7 @@
 """Guides keep their promises: every snippet runs, in the order of its page."""
 
+import gc
+import io
 import re
 from pathlib import Path
 
@@ -29,6 +31,14 @@ def searches_stay(monkeypatch):
 def test_every_snippet_runs(page, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert [*run(page)]
+    assert not _left_open(tmp_path)
+
+
+def _left_open(folder: Path) -> list[str]:
+    """Its files that something still holds open: their warning would come in whichever test collects them."""
+    files = [each for each in gc.get_objects() if isinstance(each, io.FileIO) and not each.closed]
+    names = [each.name for each in files if isinstance(each.name, str)]
+    return [name for name in names if Path(name).resolve().is_relative_to(folder.resolve())]
 
 
 def test_code_of_the_guides_is_marked_as_what_it_is():
