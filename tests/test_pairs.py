@@ -1,5 +1,7 @@
 """How many tooth pairs are carried along, and what happens where they are too few."""
 
+from dataclasses import replace
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -46,6 +48,13 @@ def test_next_pairs_count_with_what_is_removed_from_them(mesh):
     some[1, 0, 0] = some[0, 0, -1] = 0.0
     flagged = jg.contact.solve_removed(mesh, 50.0, jnp.asarray(some))
     assert np.max(flagged.residual) < 1e-10 and flagged.status[8] == Status.MORE_PAIRS_NEEDED
+
+
+def test_a_gap_of_the_support_moves_the_next_pairs_as_it_does_the_others(mesh):
+    """Flanks that the support brings 3 um nearer touch 3 um earlier."""
+    nothing = as_removed(mesh.resolution, jnp.zeros((2, 1, 16)))
+    nearer = outermost(replace(mesh, support_gap=jnp.asarray([-3.0])), nothing)
+    np.testing.assert_allclose(nearer, outermost(mesh, nothing) - 3.0, rtol=1e-12)
 
 
 @pytest.mark.slow
