@@ -203,7 +203,8 @@ def test_files_that_knew_no_tools_have_the_rack_of_iso_53(tmp_path, caplog):
     gears = GEAR.format(1, 30.0, 23, 3, 0.581) + GEAR.format(2, -30.0, 67, 4, 0.5131)
     path.write_text(EARLY.format(gears=gears), encoding="utf-8")
     found = read_rexs(path).pair
-    assert "names no tools, those of the rack of ISO 53 in Gear are taken: flank_geometry 3" in caplog.text
+    for name, value in (("dedendum", 1.25), ("root_radius", 0.38)):
+        assert f"pinion.{name} = {value} (basic rack of ISO 53)" in caplog.text
     wanted = [jg.Gear(z, 1.0, 20.0, x, face_width=11.0, helix_angle=beta) for z, x, beta in
               ((23, 0.581, 30.0), (67, 0.5131, -30.0))]  # fmt: skip
     same(found, jg.GearPair(*wanted, 53.0))

@@ -363,8 +363,6 @@ REFUSED = {
     "no module": ('id="normal_module" unit="mm">3.0', 'id="normal_module" unit="mm">0', "0 mm must be greater than 0"),
     "thicker tooth": (TEETH, attribute("chordal_tooth_thickness_upper_deviation", "0.05") + TEETH,
                       "upper_deviation: 0.05 makes the tooth 50.17 um thicker, must be at most 0"),
-    "no corner radius": (RACK, "", "tip_corner_radius_factor_reference_profile: missing"),
-    "no tool": ('type="manufacturing_step"', 'type="step"', "must be made by one rack_shaped_tool"),
     "another tool": ('type="rack_shaped_tool"', 'type="profile_tool"', "makes a flank, must be a rack_shaped_tool"),
     "another module": ('name="pinion tool">\n      <attribute id="normal_module" unit="mm">3.0',
                        'name="pinion tool">\n      <attribute id="normal_module" unit="mm">3.5',
@@ -655,7 +653,7 @@ def test_the_command_refuses_in_one_line_and_writes_nothing(tmp_path):
         ((rexs, tmp_path / f"{'a' * 300}.toml", "--torque", "50"), "aaa.toml: cannot be written: File name too long"),
         (
             (rexs, tmp_path / "new.txt"),
-            "pair.rexs to new.txt: one name must end in .toml, the other in .rexs or .rexsj",
+            "pair.rexs to new.txt: one name must end in .toml, the other in .rexs, .xml, .rexsj, .json, .rexsz, .zip",
         ),
         ((rexs, tmp_path / "new.toml", "--stage", "7"), "has no cylindrical_stage 7, must be one of 2"),
         ((rexs, tmp_path / "new.toml", "--torque", "0"), "torque = 0 N m must be greater than 0 N m"),

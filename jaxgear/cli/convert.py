@@ -1,36 +1,49 @@
-"""What the commands `new` and `convert` do: a design file to begin with, and its conversion to REXS and back."""
+"""The commands `new` and `convert`: a design file to begin with, its conversion to REXS and back, stages of a file."""
 
 import os
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, Literal
 
 import jax
 
 from ..geometry import GearPair
-from ..io import DesignFileError, load_design, read_rexs, write_design, write_rexs
+from ..io import DesignFileError, RexsStage, load_design, read_rexs, rexs_stages, write_design, write_rexs
 from ..io.toml import read
 from ..io.write_design import write_starter
+from ..report import Table
 from . import interrupt, terminal
 
-_REXS, _DESIGN = (".rexs", ".xml", ".rexsj", ".json"), (".toml",)
+_REXS, _DESIGN = (".rexs", ".xml", ".rexsj", ".json", ".rexsz", ".zip"), (".toml",)
 _TAKEN = {"title", "materials", "pinion", "wheel", "pair", "load"}  # tables of a design file that REXS has a place for
 
 
 def convert(
     source: Path,
-    target: Path,
+    target: Path | None,
     *,
     stage: int | None,
     flank: Literal["left", "right"] | None,
     load_case: int | None,
     torque: float | None,
+    given: Iterable[str],
 ) -> None:
-    """Converts a file by the ends of both names; a file that is there is never replaced."""
+    """Converts a file by the ends of both names; a file that is there is never replaced.
+
+    Without a target it prints the stages of a REXS file.
+    """
     jax.config.update("jax_enable_x64", True)
+    options = {"--stage": stage, "--flank": flank, "--load-case": load_case, "--torque": torque, "--set": given or None}
+    if target is None:
+        _check_unused(options, "without OUT")
+        if source.suffix not in _REXS:
+            raise ValueError(f"{source.name}: give OUT, only a REXS file has stages to list")
+        terminal.say_columns(_stages(rexs_stages(source)))
+        return
     if os.path.lexists(target):  # a link that leads nowhere is there too
         raise ValueError(f"{target}: exists already, choose another name")
     if source.suffix in _REXS and target.suffix in _DESIGN:
-        found = read_rexs(source, stage=stage, flank=flank, load_case=load_case)
+        found = read_rexs(source, stage=stage, flank=flank, load_case=load_case, given=_numbers(given))
         torque = found.torque if torque is None else torque
         if torque is None:
             raise DesignFileError("", "names no torque of the pinion, give it with --torque", source)
@@ -47,13 +60,45 @@ def convert(
             )
         _say(target, found.pair)
     elif source.suffix in _DESIGN and target.suffix in _REXS:
-        options = {"--stage": stage, "--flank": flank, "--load-case": load_case, "--torque": torque}
-        for name, given in options.items():
-            if given is not None:
-                raise ValueError(f"{name} has no effect on a design file, leave it out")
+        _check_unused(options, "on a design file")
         _to_rexs(source, target)
     else:
-        raise ValueError(f"{source.name} to {target.name}: one name must end in .toml, the other in .rexs or .rexsj")
+        ends = ", ".join(_REXS)
+        raise ValueError(f"{source.name} to {target.name}: one name must end in .toml, the other in {ends}")
+
+
+def _check_unused(options: dict[str, Any], where: str) -> None:
+    for name, value in options.items():
+        if value is not None:
+            raise ValueError(f"{name} has no effect {where}, leave it out")
+
+
+def _numbers(given: Iterable[str]) -> dict[str, float]:
+    """Numbers by their keys, from KEY=VALUE."""
+    found: dict[str, float] = {}
+    for text in given:
+        key, equals, value = text.partition("=")
+        try:
+            found[key.strip()] = float(value)
+        except ValueError:
+            raise ValueError(f"--set {text}: must be KEY=NUMBER, as in --set pinion.tip_diameter=63.5") from None
+    return found
+
+
+def _stages(stages: Iterable[RexsStage]) -> Table:
+    """Stages of a file, and why those that are not converted are not."""
+
+    def shown(value: float | None) -> str:
+        return "-" if value is None else f"{value:.6g}"
+
+    table = Table(("id", "stage", "teeth", "m_n mm", "beta deg", "a mm", "converted"))
+    for stage in stages:
+        teeth = "/".join(map(shown, stage.teeth)) or "-"
+        numbers = shown(stage.module), shown(stage.helix_angle), shown(stage.center_distance)
+        names = ", ".join(dict.fromkeys(key.partition(".")[2] for key in stage.completed))
+        result = f"no: {stage.problem}" if stage.problem else f"yes, completed: {names}" if names else "yes"
+        table.add_row(str(stage.id), stage.kind.removesuffix("_stage"), teeth, *numbers, result)
+    return table
 
 
 def _to_rexs(source: Path, target: Path) -> None:

@@ -24,6 +24,14 @@ def say_rows(block: Table) -> None:
         out.print(printable(f"  {label:<{width}}  {text}"), soft_wrap=True)
 
 
+def say_columns(block: Table) -> None:
+    """Prints a table in aligned columns, whose last one the terminal may break."""
+    rows = [block.header, *block.rows]
+    widths = [max(map(len, column)) for column in zip(*rows)]
+    widths[-1] = 0
+    say(*("  ".join(f"{cell:<{width}}" for cell, width in zip(row, widths)) for row in rows))
+
+
 def say(*lines: str) -> None:
     """Prints lines that the terminal may break."""
     for line in lines:

@@ -2,11 +2,12 @@
 
 import logging
 from codecs import BOM_UTF8
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import reduce
 from operator import add
 from pathlib import Path
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -14,8 +15,10 @@ from ...geometry import GearPair
 from ...microgeometry import AbstractModification, NoModification
 from ..errors import DesignFileError, naming, refused
 from ..toml import content
-from .gears import QUALITY, check_external, read_gear, read_quality, without_tool
+from .container import is_container, unpacked
+from .gears import QUALITY, check_external, read_gear, read_quality
 from .json_form import parse_json
+from .open_numbers import FLANK, GEAR, STAGE, Completed
 from .read_flank import read_modification
 from .rexs_model import Component, Model, parse
 from .topography import joined
@@ -25,6 +28,8 @@ _LOG = logging.getLogger("jaxgear")
 _OLDEST, _NEWEST = (1,), (2,)
 _MODIFIED = (1, 4)  # since when modifications of flanks are those of today
 _ALIKE = 1e-9  # um
+_LISTED = "jaxgear convert FILE lists its stages"
+_NAMES = "pinion", "wheel"
 _ALONG, _ACROSS = "position_of_profile_modification", "diameter_of_helix_modification"
 _GEOMETRY = (
     "normal_pressure_angle",
@@ -45,6 +50,7 @@ class RexsPair:
         torque: on the pinion [N m], None where the file names none.
         speed: of the pinion [rpm], likewise.
         quality_classes: flank tolerance classes of pinion and wheel (ISO 1328-1:2013), None where a gear has none.
+        completed: numbers that the file leaves open and those that were given, in words, by their keys.
     """
 
     title: str
@@ -54,6 +60,7 @@ class RexsPair:
     torque: float | None
     speed: float | None
     quality_classes: tuple[int, int] | None
+    completed: Mapping[str, str]
 
 
 def read_rexs(
@@ -62,13 +69,16 @@ def read_rexs(
     stage: int | None = None,
     flank: Literal["left", "right"] | None = None,
     load_case: int | None = None,
+    given: Mapping[str, float] | None = None,
 ) -> RexsPair:
-    """Reads an external pair from a REXS file in XML or JSON; before version 1.4 without modifications.
+    """Reads an external pair from a REXS file in XML or JSON, or in a zip archive of one (.rexsz).
 
-    Both gears are taken as centred on each other. A gear without a material is of steel, and one without an inner
-    diameter has the bore that `Gear` gives it; flanks of files that knew no tools yet are those of the rack of `Gear`,
-    which is logged. A modification that is given at other places than the ends of the library's flank goes on to these
-    by its own law.
+    Modifications are those of version 1.4 or later; before, a file that has some is refused.
+
+    Both gears are taken as centred on each other. What the file leaves open of a gear is completed, in files of all
+    versions alike, and logged: the dedendum by the root diameter, else that of the basic rack of ISO 53, as the root
+    radius and the addendum; bore and material as those that `Gear` has without them. A modification that is given at
+    other places than the ends of the library's flank goes on to these by its own law.
 
     Helix angles are positive for a right hand. Left and right flanks are seen from the datum face (ISO 21771): a pinion
     that drives with its right flanks turns clockwise from there. Face coordinates of the library are then those of the
@@ -76,10 +86,14 @@ def read_rexs(
     the other end.
 
     Args:
-        path: of the file.
+        path: of the file; of an archive nothing but its one model is read, at most 256 MiB, and nothing is unpacked.
         stage: id of the cylindrical stage, needed where the file has several.
         flank: which flanks touch, needed where the left and the right ones are modified differently.
         load_case: id of the load case, needed where the file has several.
+        given: numbers in place of those of the file, by their keys in a design file and in the units there:
+            teeth, module, pressure_angle, profile_shift, helix_angle, face_width, addendum, dedendum, root_radius,
+            tip_diameter, tip_form_diameter and bore_diameter of pinion and wheel, as "pinion.tip_diameter", and
+            "pair.center_distance". With dedendum and root_radius the tools of the file are not read.
 
     Raises:
         DesignFileError: for whatever is wrong with the file or not of this library, in one line that names component
@@ -88,13 +102,12 @@ def read_rexs(
     """
     file = Path(path)
     with naming(file):
-        held = content(file)
-        model = parse_json(held) if held.removeprefix(BOM_UTF8).lstrip()[:1] == b"{" else parse(held)
-        found = _read(model, stage, flank, load_case)
+        model = model_of(file)
+        found = _read(model, stage, flank, load_case, Completed(given or {}))
     said = (part for several in (model.components, *model.cases.values()) for part in several.values())
-    if bare := [part for part in model.components.values() if without_tool(model, part)]:
-        shown = f"{bare[0].where()}, the first of {len(bare)}"
-        _LOG.warning("%s: names no tools, those of the rack of ISO 53 in Gear are taken: %s", file, shown)
+    if found.completed:
+        shown = ", ".join(f"{key} = {value}" for key, value in found.completed.items())
+        _LOG.warning("%s: numbers beside those of the file: %s; --set KEY=VALUE gives others", file, shown)
     silent = list(dict.fromkeys(place for part in said for place in part.without_unit))
     if silent:
         shown = f"{silent[0]}, the first of {len(silent)}" if len(silent) > 1 else silent[0]
@@ -102,16 +115,53 @@ def read_rexs(
     return found
 
 
-def _read(model: Model, stage: int | None, flank: str | None, load_case: int | None) -> RexsPair:
-    chosen = _stage(model, stage)
-    gears = _driving_first(model, chosen)
+def model_of(file: Path) -> Model:
+    """The model of a file in XML or JSON, or in a container of one."""
+    held = content(file)
+    if is_container(held):
+        held = unpacked(held)
+    return parse_json(held) if held.removeprefix(BOM_UTF8).lstrip()[:1] == b"{" else parse(held)
+
+
+def _read(model: Model, stage: int | None, flank: str | None, load_case: int | None, completed: Completed) -> RexsPair:
+    found = read_stage(model, stage, flank, completed)
+    torque, speed = _load(model, found.stage, found.gears[0], load_case)
+    units = [part for part in model.components.values() if part.type == "gear_unit"]
+    title = units[0].text("model_name") if units else ""
+    classes = _classes(found.gears)
+    return RexsPair(title, found.pair, *found.modifications, torque, speed, classes, completed.numbers)
+
+
+class Stage(NamedTuple):
+    """A stage that is a pair of the library.
+
+    Attributes:
+        stage, gears: components; the pinion first.
+        pair: the gears.
+        modifications: of the flanks of pinion and wheel.
+    """
+
+    stage: Component
+    gears: list[Component]
+    pair: GearPair
+    modifications: tuple[AbstractModification, AbstractModification]
+
+
+def read_stage(model: Model, stage: int | None, flank: str | None, completed: Completed) -> Stage:
+    """A stage without its load, see `read_rexs`.
+
+    Raises:
+        DesignFileError: where it is no pair of the library.
+    """
+    chosen = completed.of("pair", _stage(model, stage), STAGE)
+    gears = _with_given(model, _driving_first(model, chosen), completed)
     for gear in gears:
         check_external(gear)
     _check_version(model)
     _check_axes(gears)
     flank = _loaded(model, chosen, gears) if flank is None else flank
     flanks = [_flank(model, gear, flank) for gear in gears]
-    pinion, wheel = (read_gear(model, gear, face) for gear, face in zip(gears, flanks))
+    pinion, wheel = (read_gear(model, *each, completed) for each in zip(gears, flanks, _NAMES))
     distance = chosen.needed("center_distance", "mm")
     pair: GearPair = refused(chosen.where(), GearPair, pinion, wheel, distance)
     width, common = float(pair.face_width), chosen.number("common_face_width", "mm")
@@ -126,10 +176,17 @@ def _read(model: Model, stage: int | None, flank: str | None, load_case: int | N
     on_pinion, on_wheel = (_modification(model, *side) for side in sides)
     if not pair.is_spur:
         _check_direction(gears, flank, turned, sides, (on_pinion, on_wheel))
-    torque, speed = _load(model, chosen, gears[0], load_case)
-    units = [part for part in model.components.values() if part.type == "gear_unit"]
-    title = units[0].text("model_name") if units else ""
-    return RexsPair(title, pair, on_pinion, on_wheel, torque, speed, _classes(gears))
+    return Stage(chosen, gears, pair, (on_pinion, on_wheel))
+
+
+def _with_given(model: Model, gears: list[Component], completed: Completed) -> list[Component]:
+    """Pinion and wheel with the numbers that are given, which their flanks have in the model too."""
+    for owner, gear in zip(_NAMES, gears):
+        for side in ("left", "right"):
+            for flank in model.related("flank", "gear", gear.id, side):
+                model.components[flank.id] = completed.of(owner, flank, FLANK)
+        model.components[gear.id] = completed.of(owner, gear, GEAR)
+    return [model.components[gear.id] for gear in gears]
 
 
 def _classes(gears: list[Component]) -> tuple[int, int] | None:
@@ -147,12 +204,14 @@ def _stage(model: Model, wanted: int | None) -> Component:
     stages = [part for part in model.components.values() if part.type == "cylindrical_stage"]
     known = ", ".join(str(part.id) for part in stages)
     if not stages:
-        raise DesignFileError("", "has no cylindrical_stage")
+        raise DesignFileError("", f"has no cylindrical_stage; {_LISTED}")
     if wanted is None and len(stages) > 1:
-        raise DesignFileError("", f"has {len(stages)} cylindrical stages, choose one of {known} by its id (stage)")
+        raise DesignFileError(
+            "", f"has {len(stages)} cylindrical stages, choose one of {known} by its id (stage); {_LISTED}"
+        )
     found = [part for part in stages if wanted in (None, part.id)]
     if not found:
-        raise DesignFileError("", f"has no cylindrical_stage {wanted}, must be one of {known}")
+        raise DesignFileError("", f"has no cylindrical_stage {wanted}, must be one of {known}; {_LISTED}")
     return found[0]
 
 

@@ -70,13 +70,22 @@ class Attribute:
 
 @dataclass
 class Component:
-    """A part of the gear unit, or something that belongs to one."""
+    """A part of the gear unit, or something that belongs to one.
+
+    Attributes:
+        id: of the file, 0 for what the file does not hold.
+        type, name: of the component.
+        attributes: by their names.
+        without_unit: attributes that were taken in the unit of the standard.
+        keys: keys of a design file, by the attributes that a user may give beside the file.
+    """
 
     id: int
     type: str
     name: str = ""
     attributes: dict[str, Attribute] = field(default_factory=dict)
-    without_unit: list[str] = field(default_factory=list)  # what was taken in the unit of the standard
+    without_unit: list[str] = field(default_factory=list)
+    keys: dict[str, str] = field(default_factory=dict)
 
     def where(self, attribute: str = "") -> str:
         """`cylindrical_gear 15: face_width`."""
@@ -85,6 +94,11 @@ class Component:
     def refuse(self, attribute: str, problem: str) -> DesignFileError:
         """The refusal of an attribute."""
         return DesignFileError(self.where(attribute), problem)
+
+    def missing(self, attribute: str) -> DesignFileError:
+        """The refusal of an attribute that is not there, with the option that gives it."""
+        key = self.keys.get(attribute)
+        return self.refuse(attribute, f"missing, give it with --set {key}=VALUE" if key else "missing")
 
     def number(self, attribute: str, unit: str, *, shift: int = 0) -> float | None:
         """A number times 10^shift, None where it is absent. The shift is of the decimal digits, so that it is exact."""
@@ -99,14 +113,14 @@ class Component:
         """A number that has to be there."""
         value = self.number(attribute, unit)
         if value is None:
-            raise self.refuse(attribute, "missing")
+            raise self.missing(attribute)
         return value
 
     def numbers(self, attribute: str, unit: str, *, shift: int = 0) -> np.ndarray:
         """An array that has to be there, times 10^shift."""
         value = self._value(attribute, unit)
         if value is None:
-            raise self.refuse(attribute, "missing")
+            raise self.missing(attribute)
         if isinstance(value, str):
             raise self.refuse(attribute, "must be an array, not a single value")
         return np.array([self._float(attribute, item, unit, shift) for item in value])

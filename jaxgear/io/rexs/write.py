@@ -14,6 +14,7 @@ from ...microgeometry import AbstractModification
 from ...numerics import check
 from ...numerics.durable import write_durably
 from ..folder import writing
+from .container import SUFFIXES, packed
 from .gears import write_gear
 from .json_form import to_json
 from .results import write_results
@@ -48,7 +49,8 @@ def write_rexs(
     tip edges, goes into attributes of the name `custom_jaxgear_...`, which REXS leaves to programs.
 
     Args:
-        path: of the file, in JSON where it ends in .rexsj or .json, else in XML.
+        path: of the file, in JSON where it ends in .rexsj or .json, else in XML; in a zip archive where it ends in
+            .rexsz or .zip.
         pair: gear pair; the pinion is gear 1 of the stage.
         pinion, wheel: modifications of the flanks.
         torque: on the pinion [N m].
@@ -111,6 +113,8 @@ def write_rexs(
     if cycle is not None:
         write_results(model, data[0], cycle, case=_CASE, speed=speed, friction=friction)
     text = to_json(model) if Path(path).suffix in _JSON else xml(model)
+    if Path(path).suffix in SUFFIXES:
+        text = packed(text, f"{Path(path).stem}.rexs")
     with writing(path):
         write_durably(Path(path), lambda file: file.write(text))
 

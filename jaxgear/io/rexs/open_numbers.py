@@ -1,0 +1,70 @@
+"""Numbers that a REXS file leaves open: given beside it, or completed.
+
+One rule holds for files of all versions. What a file says is taken. Any number can be given under its key of a design
+file, `pinion.tip_diameter`, and takes the place of that of the file. What is left is completed: the dedendum by the
+root diameter, everything else by what `Gear` has without it, the basic rack of ISO 53 and steel.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+from ..errors import DesignFileError, not_known
+from .rexs_model import Attribute, Component
+
+# Keys of a design file: attribute of REXS and its unit there, by the component that says it.
+GEAR = {
+    "teeth": ("number_of_teeth", "none"),
+    "module": ("normal_module", "mm"),
+    "helix_angle": ("helix_angle_reference_diameter", "deg"),
+    "face_width": ("face_width", "mm"),
+    "tip_diameter": ("tip_diameter", "mm"),
+    "tip_form_diameter": ("tip_form_diameter", "mm"),
+    "bore_diameter": ("inner_diameter", "mm"),
+}
+FLANK = {
+    "pressure_angle": ("normal_pressure_angle", "deg"),
+    "profile_shift": ("addendum_modification_coefficient", "none"),
+    "addendum": ("addendum_coefficient_basic_profile", "none"),
+}
+TOOL = {
+    "dedendum": ("addendum_coefficient_reference_profile", "none"),
+    "root_radius": ("tip_corner_radius_factor_reference_profile", "none"),
+}
+STAGE = {"center_distance": ("center_distance", "mm")}
+_KEYS = [*(f"{gear}.{name}" for gear in ("pinion", "wheel") for name in (GEAR | FLANK | TOOL)), "pair.center_distance"]
+
+
+@dataclass
+class Completed:
+    """Numbers beside those of the file.
+
+    Attributes:
+        given: by their keys, in the units of a design file.
+        numbers: given and completed ones in words, by their keys.
+    """
+
+    given: Mapping[str, float]
+    numbers: dict[str, str] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        for key in self.given:
+            if key not in _KEYS:
+                raise DesignFileError("", not_known(key, _KEYS))
+
+    def of(self, owner: str, part: Component, keys: Mapping[str, tuple[str, str]]) -> Component:
+        """A component with the numbers that are given of its owner: pinion, wheel or pair."""
+        attributes = dict(part.attributes)
+        for name, (attribute, unit) in keys.items():
+            if (key := f"{owner}.{name}") in self.given:
+                value = self.given[key]
+                held = part.number(attribute, unit)
+                replaced = "" if held is None or held == value else f" in place of {held:g}"
+                self.numbers[key] = f"{value:g} (given{replaced})"
+                attributes[attribute] = Attribute(repr(float(value)), unit)
+        options = {attribute: f"{owner}.{name}" for name, (attribute, _) in keys.items()}
+        return replace(part, attributes=attributes, keys=options)
+
+    def say(self, key: str, value: object, why: str) -> None:
+        """Takes down what is completed, with what."""
+        shown = f"{value:.6g}" if isinstance(value, float) else value
+        self.numbers[key] = f"{shown} ({why})"
