@@ -278,11 +278,40 @@ def test_a_file_is_read_by_phase_or_angle(tmp_path, unit):
 
 
 @pytest.mark.parametrize(
+    "heading, per_micrometre",
+    [
+        ("te_mm", lambda radius: 1e-3),
+        ("TE [\u00b5m]", lambda radius: 1.0),
+        ("te_{}_deg", lambda radius: 1e-3 / radius * 180 / np.pi),
+        ("te_{}_arcsec", lambda radius: 1e-3 / radius * 180 / np.pi * 3600),
+        ("TE {} [arc-sec]", lambda radius: 1e-3 / radius * 180 / np.pi * 3600),
+        ("te_{}_rad", lambda radius: 1e-3 / radius),
+        ("te_{} (\u00b5rad)", lambda radius: 1e3 / radius),
+    ],
+)
+@pytest.mark.parametrize("teeth, shaft", [(19, "pinion"), (48, "wheel")])
+def test_errors_in_other_units_are_lengths_on_the_line_of_action(tmp_path, heading, per_micrometre, teeth, shaft):
+    """An angle of a shaft by the base radius of its gear, of module 3 and 20 degrees, by hand."""
+    scale = per_micrometre(1.5 * teeth * np.cos(np.deg2rad(20.0)))
+    columns = {name: column for name, column in GOOD.items() if name != "te_um"}
+    lines = rows(columns | {heading.format(shaft): np.zeros(16)}).splitlines()
+    texts = [lines[0], *(line[:-1] + repr(float(scale * value)) for line, value in zip(lines[1:], GOOD["te_um"]))]
+    (tmp_path / "te.csv").write_text("\n".join(texts), encoding="utf-8")
+    read = read_measurement(tmp_path / "te.csv", mesh().pair, noise=0.2)
+    np.testing.assert_allclose(read.transmission_error, GOOD["te_um"], rtol=1e-12)
+
+
+@pytest.mark.parametrize(
     "columns, says",
     [
         ({name: GOOD[name] for name in ("phase", "te_um")}, "torque_Nm: missing, this column is required"),
         ({name: GOOD[name] for name in ("torque_Nm", "te_um")}, "phase: there must be one of the columns"),
-        (GOOD | {"te_mm": GOOD["te_um"]}, "te_mm: unknown column"),
+        (GOOD | {"te_mm": GOOD["te_um"]}, "has several columns of te_um: te_um, te_mm, must have one"),
+        (GOOD | {"te_wheel_deg": GOOD["te_um"]}, "te_wheel_deg: has no effect beside te_um, leave one out"),
+        (
+            {"te_arcsec" if name == "te_um" else name: column for name, column in GOOD.items()},
+            "te_arcsec: is an angle of one shaft: name it te_wheel_arcsec or te_pinion_arcsec (1 arcsec is ",
+        ),
         (GOOD | {"torque_Nm": 1e3 * GOOD["torque_Nm"]}, "torque_Nm: 60000 N m is more than the teeth carry"),
         (GOOD | {"te_um": 1e-6 * GOOD["te_um"]}, "te_um: varies by 1.5e-05 um only"),
         (GOOD | {"te_um": 1e3 * GOOD["te_um"]}, "te_um: varies by 15000 um"),

@@ -126,6 +126,33 @@ def test_a_measured_flank_comes_back_as_it_was(side, tmp_path):
         assert again.read_text() == path.read_text()
 
 
+MACHINES = {  # the same profile as measuring machines and spreadsheets write it: separator, headings, decimal mark
+    "columns of jaxgear": ("roll_length_mm,measured_um", ",", 1.0, 1.0, "."),
+    "semicolons and decimal commas": ("# gear 4711;;\nRoll length [mm];Deviation [um];tooth", ";", 1.0, 1.0, ","),
+    "a line of units": ("Roll angle\tDeviation\n[deg]\t[mm]", "\t", 180 / np.pi / 70.0, 1e-3, "."),
+    "radians and micrometres": ("roll angle (rad);Abweichung (\u00b5m)", ";", 1 / 70.0, 1.0, "."),
+    "inches": ("length_of_roll_in,profile_deviation_in", ",", 1 / 25.4, 1e-3 / 25.4, "."),
+    "diameters": ("Durchmesser [mm];Deviation [nm]", ";", None, 1e3, ","),
+}
+
+
+@pytest.mark.parametrize("machine", MACHINES)
+def test_columns_of_measuring_machines(tmp_path, machine):
+    """Units are those that the file names, on a base circle of 70 mm radius."""
+    head, separator, along, amount, mark = MACHINES[machine]
+    roll, deviation = np.array([20.0, 26.5, 31.7]), np.array([0.0, -1.5, -7.25])
+    place = 2 * np.hypot(70.0, roll) if along is None else along * roll
+    tooth = separator + "1" if "tooth" in head else ""
+    rows = [
+        f"{at!r}{separator}{by!r}".replace(".", mark) + tooth
+        for at, by in zip(place.tolist(), (amount * deviation).tolist())
+    ]
+    path = written(tmp_path, "\n".join([head, *rows, ""]))
+    flank = io.read_flank(path, base_radius=70.0)
+    np.testing.assert_allclose(flank.position, roll, rtol=1e-12)
+    np.testing.assert_allclose(flank.amount, -deviation, rtol=1e-12)
+
+
 def test_excess_material_is_what_is_not_removed(tmp_path):
     flank = io.read_flank(written(tmp_path, MEASURED))
     np.testing.assert_array_equal(flank.face_coordinate, [-8.0, 0.0, 9.5])
@@ -216,7 +243,10 @@ HEAD = "roll_length_mm,face_coordinate_mm,measured_um\n"
         (HEAD + "20,0,1\n", "has 1 place along the profile, must have at least 2"),
         ("trace," + HEAD + "helix,20,0,1\nhelix,20,1,1\n", "holds a helix alone, must hold a profile"),
         ("roll_length_mm,measured_um\n10,5,0,3\n", "point 1 has 4 fields, the headings 2: numbers must have no commas"),
-        ("roll_length_mm;measured_um\n10,5;0,3\n", "separates its columns by semicolons, must have commas"),
+        ("roll_length_mm;measured_um\n10,5;0.3\n", 'has "10,5" and "0.3", must have one decimal mark'),
+        ("roll_length_mm,deviation\n10,3\n", 'deviation: names no unit, write "deviation [um]"'),
+        ("roll_length_mm,deviation [deg]\n10,3\n", 'unit "deg" must be one of nm, um, mm, m, in'),
+        ("roll_length_mm,deviation [um],measured_um\n10,3,4\n", "has several columns of measured_um: deviation [um], "),
         (HEAD.replace("measured_um", "measured_um,measured_um") + "20,0,1,2\n", "has several columns measured_um"),
         (HEAD + "-1,0,1\n20,0,2\n", "roll_length_mm = -1 mm must be at least 0 mm (base circle)"),
         ("face_coordinate_mm,measured_um\n0,1\n", "has no column roll_length_mm, must have one where no base radius"),
@@ -354,6 +384,19 @@ def test_a_design_file_takes_a_measured_flank(tmp_path):
     more = 'method = "natural_cubic"'
     design = io.load_design(written(tmp_path, DESIGN.format(file="measured.csv", more=more), "design.toml"))
     assert design.design({})[0].method == "natural_cubic"
+
+
+def test_a_design_file_takes_the_base_radius_of_its_gear(tmp_path):
+    """For places by roll angles or diameters, unless variables decide it."""
+    base = 75.0 * np.cos(np.deg2rad(20.0))
+    rows = [f"{2 * np.hypot(base, roll)};{-amount}" for roll, amount in ((19.6, 0.0), (26.5, 1.5), (31.7, 7.0))]
+    written(tmp_path, "\n".join(["diameter [mm];deviation [um]", *rows]))
+    text = DESIGN.format(file="measured.csv", more="")
+    flank = io.load_design(written(tmp_path, text, "design.toml")).design({})[0]
+    np.testing.assert_allclose(flank.position, [19.6, 26.5, 31.7], rtol=1e-9)
+    text = text.replace("module = 3.0", 'module = "m"', 1) + "[variables]\nm = { low = 2.9, high = 3.1 }\n"
+    with pytest.raises(io.DesignFileError, match="has no column roll_length_mm, must have one where no base radius"):
+        io.load_design(written(tmp_path, text, "design.toml"))
 
 
 @pytest.mark.parametrize(

@@ -208,7 +208,8 @@ def identify(
 ) -> int:
     """Find the values of the variables that gave a measured transmission error, and how well it tells them.
 
-    The file has the columns torque_Nm, te_um, and phase (base pitches) or angle_deg (of the pinion).
+    The file has the columns torque_Nm, te_um, and phase (base pitches) or angle_deg (of the pinion). An error that is
+    an angle names its shaft and unit: te_wheel_arcsec, te_pinion_deg.
     """
     shared = {"no_figures": no_figures, "reported": reported, "no_cache": no_cache}
     unknown: dict[str, Any] = {"noise": noise, "torque_scale": torque_scale, "offset": offset, "pitch": pitch}

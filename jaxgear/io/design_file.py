@@ -372,8 +372,8 @@ def _read(file: Path, says: dict[str, Any]) -> DesignFile:
         increasing("load.torque_range[1]", load.torque_range[0], load.torque_range[1], unit=" N m")
     materials = materials_of(top.materials)
     sections = {"pinion": top.pinion, "wheel": top.wheel}
-    flanks = {name: flank_of(section, folder) for name, section in sections.items()}
     pair = pair_of(top.pair, *(gear_part(section, materials) for section in sections.values()))
+    flanks = {name: flank_of(section, folder, pair.fields[name]) for name, section in sections.items()}
     axes, point = part_of(top.misalignment, Misalignment), part_of(load, OperatingPoint)
     model = model_part(top.model)
     open_case = [*pair.free(), *model.free(), *axes.free(), *point.free()]

@@ -2,8 +2,9 @@
 
 Beyond its ends a table goes on with its last values, so that one of another gear would pass for a flank unnoticed.
 
-Columns end in their unit. `design_um` and `measured_um` have the sign of the machines, positive for excess material;
-`modification_um`, as in `flanks.csv`, and `wear_depth_um` are the material removed.
+Columns end in their unit; other units and the headings of measuring machines are converted to these. `design_um` and
+`measured_um` have the sign of the machines, positive for excess material; `modification_um`, as in `flanks.csv`, and
+`wear_depth_um` are the material removed.
 """
 
 from collections.abc import Mapping, Sequence
@@ -21,6 +22,7 @@ from ..microgeometry.base import AMOUNTS
 from ..numerics import Given, Number, check, real
 from . import template
 from .errors import DesignFileError, naming, referring
+from .headings import Column, converted
 from .results import MEASURED
 from .rows import Rows, read_rows
 from .table_keys import FileTable, entry
@@ -111,6 +113,18 @@ _REMOVED, _WORN, _DESIGN = "modification_um", "wear_depth_um", "design_um"
 # what makes material removed of the first of them
 _AMOUNTS = {MEASURED: -1.0, _REMOVED: 1.0, _WORN: 1.0, _DESIGN: -1.0}
 _ALONG, _ACROSS, _GEAR, _LIFE = "roll_length_mm", "face_coordinate_mm", "gear", "revolutions"
+_ANGLE, _DIAMETER = "roll_angle_deg", "diameter_mm"
+# what machines call them; positive deviations are excess material on all of them
+_COLUMNS = (
+    Column(MEASURED, ("deviation", "profile_deviation", "measured_deviation", "abweichung")),
+    Column(_REMOVED),
+    Column(_WORN),
+    Column(_DESIGN),
+    Column(_ALONG, ("length_of_roll", "roll_path", "rolling_length", "wälzweg", "waelzweg", "wälzlänge")),
+    Column(_ANGLE, ("angle_of_roll", "rolling_angle", "wälzwinkel", "waelzwinkel")),
+    Column(_DIAMETER, ("durchmesser",)),
+    Column(_ACROSS),
+)
 _SAME_LIFE = 1e-5  # relative: lives are asked for as they are printed, with six digits
 
 Method = Literal["linear", "natural_cubic", "monotonic"]
@@ -132,10 +146,12 @@ def read_flank(
     of design_um. Places are roll_length_mm, or roll_angle_deg or diameter_mm with a side or a base radius, and
     face_coordinate_mm. One profile gives a `TabulatedProfile`; profiles at the same places on several lines of the face
     give a `TabulatedFlank`; so do a profile and a helix (column trace), where every profile is the given one moved by
-    the helix.
+    the helix. Headings of measuring machines do too, `Deviation [mm]` and `Roll angle (deg)` for instance, in any unit
+    that they name: a deviation is positive for excess material.
 
     Args:
-        path: CSV file in UTF-8 with a line of headings, or a Parquet file, whose name ends in .parquet.
+        path: text in UTF-8 with a line of headings, columns apart by commas, or by semicolons or tabs and then with
+            decimal points or commas; or a Parquet file, whose name ends in .parquet.
         gear: of a file with flanks of both gears, "pinion" or "wheel".
         design: of a file with several designs.
         side: the gear's side of the contact, of `mesh.sides`: a table that is not on its flank is refused. It may reach
@@ -178,8 +194,14 @@ class FlankFileSection(FileTable):
     method: str = entry(choice("linear", "natural_cubic", "monotonic"), "linear")
 
 
-def flank_part(section: FlankFileSection, folder: Path) -> template.Part:
-    """The modification of a gear that a table of a design file takes from a file in the folder."""
+def flank_part(section: FlankFileSection, folder: Path, base_radius: float | None) -> template.Part:
+    """The modification of a gear that a table of a design file takes from a file in the folder.
+
+    Args:
+        section: the table.
+        folder: of the design file.
+        base_radius: of the gear [mm]; None where variables decide it, the file then needs roll lengths.
+    """
     path = folder / section.file
     with referring(f"{section.at}.file", path.name):
         rows = read_rows(path)
@@ -188,7 +210,7 @@ def flank_part(section: FlankFileSection, folder: Path) -> template.Part:
             gear = section.at.partition(".")[0]
         method: Any = section.method
         rows = _at_life(_chosen(rows, {_GEAR: gear, "design": section.design}), section.revolutions)
-        flank, reach = flank_of_rows(rows, None, method)
+        flank, reach = flank_of_rows(rows, base_radius, method)
     return template.Part(_FromFile(path.name, reach), {"flank": flank}, section.at)
 
 
@@ -235,6 +257,7 @@ def flank_of_rows(
     Raises:
         DesignFileError: where they are no flank.
     """
+    rows = converted(rows, _COLUMNS)
     amount = next((name for name in _AMOUNTS if name in rows[0]), None)
     if amount is None:
         raise DesignFileError("", f"has no column {', '.join(_AMOUNTS)}, must have one")
@@ -321,11 +344,11 @@ def _along(rows: Rows, base_radius: float | None) -> np.ndarray:
         return found
     if base_radius is None:
         raise DesignFileError("", f"has no column {_ALONG}, must have one where no base radius is given")
-    if "roll_angle_deg" in rows[0]:
-        return np.deg2rad(numbers_of(rows, "roll_angle_deg")) * base_radius
-    if "diameter_mm" not in rows[0]:
-        raise DesignFileError("", f"has no column {_ALONG}, roll_angle_deg, diameter_mm, must have one")
-    radius = 0.5 * numbers_of(rows, "diameter_mm")
+    if _ANGLE in rows[0]:
+        return np.deg2rad(numbers_of(rows, _ANGLE)) * base_radius
+    if _DIAMETER not in rows[0]:
+        raise DesignFileError("", f"has no column {_ALONG}, {_ANGLE}, {_DIAMETER}, must have one")
+    radius = 0.5 * numbers_of(rows, _DIAMETER)
     if (radius < base_radius).any():
         least = f"must be at least {2 * base_radius:g} mm (base circle)"
         raise DesignFileError("", f"diameter_mm = {2 * radius.min():g} mm {least}")

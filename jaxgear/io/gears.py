@@ -89,10 +89,13 @@ def materials_of(given: Mapping[str, Part] | None) -> Materials:
     return {_STEEL: Part(Material, {}, "material"), **(given or {})}
 
 
-def flank_of(section: GearSection, folder: Path) -> list[Part]:
+def flank_of(section: GearSection, folder: Path, gear: Part) -> list[Part]:
     """The modifications of a gear; paths begin in the folder."""
     given = section.modification
-    return [flank_part(each, folder) if isinstance(each, FlankFileSection) else each for each in given]
+    if not any(isinstance(each, FlankFileSection) for each in given):
+        return list(given)
+    base_radius = None if gear.free() else float(gear.build({}).base_radius)
+    return [flank_part(each, folder, base_radius) if isinstance(each, FlankFileSection) else each for each in given]
 
 
 def drawing_of(section: GearSection) -> dict[str, Any]:

@@ -5,6 +5,7 @@ import csv as text
 import re
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import zip_longest
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ import numpy as np
 from ..sweeps import VariantList
 from ..sweeps.columns import from_text
 from .errors import DesignFileError, check_file, naming
+from .headings import with_units
 
 Rows = list[dict[str, str]]
 
@@ -19,7 +21,10 @@ PARQUET = ".parquet"  # what the name of such a file ends with
 
 
 def read_rows(path: Path) -> Rows:
-    """Rows of a file whose name ends in .parquet, or of CSV in UTF-8 with a line of headings.
+    """Rows of a file whose name ends in .parquet, or of text in UTF-8 with a line of headings.
+
+    Columns are apart by commas, or by semicolons or tabs, and numbers may then have decimal commas. Lines that begin
+    with # before the headings are passed over; a line of units below them is taken into them.
 
     Raises:
         DesignFileError: when the file cannot be read, is no table or has no rows.
@@ -50,35 +55,50 @@ def _read_parquet(path: Path) -> Rows:
 def _read_csv(path: Path) -> Rows:
     try:
         with path.open(encoding="utf-8-sig", newline="") as file:
-            reader = csv.DictReader(file)
-            names = [name.strip() for name in reader.fieldnames or ()]
-            reader.fieldnames = names
-            rows = list(reader)
+            lines = file.read().splitlines(keepends=True)
+        while lines and (not lines[0].strip() or lines[0].startswith("#")):
+            del lines[0]
+        delimiter = next((mark for mark in ("\t", ";") if lines and mark in lines[0]), ",")
+        found = [row for row in csv.reader(lines, delimiter=delimiter) if any(map(str.strip, row))]
     except UnicodeDecodeError:
         raise DesignFileError("", "is not text in UTF-8") from None
     except OSError as error:
         raise DesignFileError("", error.strerror or str(error)) from None
     except csv.Error as error:
         raise DesignFileError("", f"is not a valid CSV file: {error}") from None
-    if not rows:
+    names, *points = [[name.strip() for name in found[0]], *found[1:]] if found else [[]]
+    if points and (units := with_units(names, points[0])) is not None:
+        names, points = units, points[1:]
+    if not points:
         raise DesignFileError("", "holds no points")
-    _check_table(names, rows)
-    return rows
+    _check_table(names, points)
+    if delimiter != ",":
+        points = _with_points(points)
+    return [dict(zip_longest(names, row[: len(names)])) for row in points]
 
 
-def _check_table(names: list[str], rows: Rows) -> None:
+def _with_points(rows: list[list[str]]) -> list[list[str]]:
+    """Cells with decimal points in place of decimal commas, which columns apart by semicolons or tabs may have."""
+    cells = [cell for row in rows for cell in row]
+    comma = next((cell for cell in cells if _COMMA.fullmatch(cell)), None)
+    point = next((cell for cell in cells if _POINT.fullmatch(cell)), None)
+    if comma and point:
+        raise DesignFileError("", f'has "{comma.strip()}" and "{point.strip()}", must have one decimal mark')
+    return [[cell.replace(",", ".") if _COMMA.fullmatch(cell) else cell for cell in row] for row in rows]
+
+
+_COMMA, _POINT = (re.compile(rf"\s*[+-]?\d*{mark}\d+([eE][+-]?\d+)?\s*") for mark in (",", r"\."))
+
+
+def _check_table(names: list[str], rows: list[list[str]]) -> None:
     """Refuses what the headings do not fit: decimal commas would be columns of their own."""
-    if len(names) == 1 and ";" in names[0]:
-        raise DesignFileError("", "separates its columns by semicolons, must have commas, and points in its numbers")
     twice = [name for name in dict.fromkeys(names) if name and names.count(name) > 1]
     if twice:
         raise DesignFileError("", f"has several columns {twice[0]}, must have one")
     for number, row in enumerate(rows, 1):
-        further = row.get(None)  # type: ignore[call-overload]
-        if further and any(map(str.strip, further)):
-            fields = len(names) + len(further)
-            problem = f"point {number} has {fields} fields, the headings {len(names)}: numbers must have no commas"
-            raise DesignFileError("", problem)
+        if any(map(str.strip, row[len(names) :])):
+            problem = f"point {number} has {len(row)} fields, the headings {len(names)}: numbers must have no commas"
+            raise DesignFileError("", f"{problem}, or columns be separated by semicolons")
 
 
 _HEADING = re.compile(r"(?P<name>.*?)(?: \[(?P<unit>[^]]*)\])?")  # as tables of sweeps are exported
