@@ -15,6 +15,7 @@ from ..report import Table
 from . import interrupt, terminal
 
 _REXS, _DESIGN = (".rexs", ".xml", ".rexsj", ".json", ".rexsz", ".zip"), (".toml",)
+_LOAD = "torque", "torque_lbf_in", "torque_lbf_ft", "speed"  # of [load], likewise
 _TAKEN = {"title", "materials", "pinion", "wheel", "pair", "load"}  # tables of a design file that REXS has a place for
 
 
@@ -123,7 +124,7 @@ def _to_rexs(source: Path, target: Path) -> None:
     _say(target, design.pair())
     tables = read(source)
     left = [f"[{name}]" for name in tables if name not in _TAKEN]
-    left += [f"load.{name}" for name in tables["load"] if name not in ("torque", "speed")]
+    left += [f"load.{name}" for name in tables["load"] if name not in _LOAD]
     if left:
         terminal.say(f"left out, REXS has no place for it: {', '.join(left)}")
 

@@ -27,6 +27,7 @@ from .gears import (
     GearSection,
     PairSection,
     both_classes,
+    check_pitches,
     drawing_of,
     flank_of,
     gear_part,
@@ -372,6 +373,7 @@ def _read(file: Path, says: dict[str, Any]) -> DesignFile:
         increasing("load.torque_range[1]", load.torque_range[0], load.torque_range[1], unit=" N m")
     materials = materials_of(top.materials)
     sections = {"pinion": top.pinion, "wheel": top.wheel}
+    check_pitches(top.pinion, top.wheel)
     pair = pair_of(top.pair, *(gear_part(section, materials) for section in sections.values()))
     flanks = {name: flank_of(section, folder, pair.fields[name]) for name, section in sections.items()}
     axes, point = part_of(top.misalignment, Misalignment), part_of(load, OperatingPoint)

@@ -12,6 +12,7 @@ from ..numerics import Number, changed, fields_of
 from ..numerics import real as real_number
 from .errors import DesignFileError, check_known
 from .flanks import FlankFileSection, flank_part
+from .imperial import NORMAL_PITCH, PITCH
 from .table_keys import FileTable, as_field, decode, described, entry, part_of, section_of
 from .template import Free, Part
 from .value_types import QUALITY_CLASS, Kind, either, list_of, not_of_kind, real, table, text
@@ -111,8 +112,17 @@ def drawing_of(section: GearSection) -> dict[str, Any]:
     return found
 
 
+def check_pitches(*sections: GearSection) -> None:
+    """Refuses the diametral pitch of gears of which one is helical: it may be that of either section."""
+    for section in sections:
+        if section.written.get("module") == PITCH and any(each.helix_angle for each in sections):
+            problem = f"may be that of the transverse section: give {NORMAL_PITCH}, which is it / cos(helix_angle)"
+            raise DesignFileError(f"{section.at}.{PITCH}", problem)
+
+
 def fixed_gear(section: GearSection, materials: Materials) -> Gear:
     """A gear of numbers, whose flanks do not count."""
+    check_pitches(section)
     for name in _WITHOUT_FLANKS:
         if name in section.given():
             raise DesignFileError(f"{section.at}.{name}", "has no effect, only pinion and wheel have flanks")

@@ -19,6 +19,7 @@ import equinox as eqx
 
 from ..numerics import Number, fields_of
 from ..numerics import real as real_number
+from . import imperial
 from .errors import DesignFileError, check_known, join, not_known, suggestion
 from .template import Free, Part
 from .value_types import Kind, choice, either, list_of, not_of_kind, real, rows_of, switch, table, text
@@ -52,6 +53,7 @@ class FileTable:
         source: class of the library, or function, whose fields they are in part; None for none.
         table: its name where it is one of the top level and its class says so; "" for another.
         at: its dotted key in the file, "" for the top level.
+        written: imperial keys that the file has in place of those of the table, by these.
     """
 
     keys: ClassVar[dict[str, Key]] = {}
@@ -65,6 +67,7 @@ class FileTable:
 
     def __init__(self, at: str, /, **given: object) -> None:
         self.at, self._given = at, given
+        self.written: dict[str, str] = {}
         for name, allowed in self.keys.items():
             if not hasattr(FileTable, name):
                 setattr(self, name, given.get(name, None if allowed.default is ... else allowed.default))
@@ -95,18 +98,23 @@ def decode(key: str, data: object, section: type[S]) -> S:
     """
     if not isinstance(data, dict):
         raise DesignFileError(key, not_of_kind("a table", data))
+    numbers = {name: allowed.kind.number for name, allowed in section.keys.items()}
+    data, written = imperial.metric(key, data, numbers)
     unknown = next((name for name in data if name not in section.keys), None)
     values = {}
     for name, allowed in section.keys.items():
         if name in data:
-            values[name] = allowed.kind.read(join(key, name), data[name])
+            values[name] = allowed.kind.read(join(key, written.get(name, name)), data[name])
         elif allowed.default is ... and unknown is None:
             raise DesignFileError(join(key, name), "missing, this key is required")
         elif allowed.default is ...:  # often it is there, misspelt
             break
     if unknown is not None:
-        raise DesignFileError(join(key, unknown), f"unknown key, {suggestion(unknown, section.keys)}")
-    return section(key, **values)
+        known = imperial.names(numbers, like=unknown) or section.keys  # a key without the unit is another number
+        raise DesignFileError(join(key, unknown), f"unknown key, {suggestion(unknown, known)}")
+    made = section(key, **values)
+    made.written = written
+    return made
 
 
 def nested(section: type[FileTable]) -> Kind:
