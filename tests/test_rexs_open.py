@@ -99,6 +99,18 @@ def test_a_rack_by_hand_stands_for_tools_that_are_not_read(tmp_path, whole):
     assert [float(gear.dedendum) for gear in found.gears] == [1.4, 1.4] and float(found.wheel.root_radius) == 0.25
 
 
+def test_chamfers_and_an_offset_of_the_faces_are_given(tmp_path, whole):
+    chamfered = whole.replace('<attribute id="number_of_teeth"', '<attribute id="chamfer_at_tooth_end" unit="mm">0.5'
+                              '</attribute><attribute id="number_of_teeth"', 1)  # fmt: skip
+    with pytest.raises(DesignFileError, match="or give the width without: --set pinion.face_width=MM"):
+        read(tmp_path, chamfered)
+    assert float(read(tmp_path, chamfered, given={"pinion.face_width": 19.0}).pair.pinion.face_width) == 19.0
+    beside = whole.replace('id="common_face_width" unit="mm">18.0', 'id="common_face_width" unit="mm">16.0')
+    with pytest.raises(DesignFileError, match="or give --set pair.axial_offset=MM"):
+        read(tmp_path, beside)
+    assert float(read(tmp_path, beside, given={"pair.axial_offset": 3.0}).pair.axial_offset) == 3.0
+
+
 def archive(path, members, **options):
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED, **options) as made:
         for name, content in members.items():

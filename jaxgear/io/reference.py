@@ -52,9 +52,9 @@ torque = 50.0      # N m on the pinion
 ```
 
 Imperial numbers say their unit in the key, in every table: the end `_in` for a number in mm or um, as in
-`face_width_in = 1.5` or `amount_in = 0.0005`, `_lbf_in` or `_lbf_ft` for one in N m, as in `torque_lbf_in = 450.0`, `_psi`
-or `_ksi` for one in MPa. `diametral_pitch = 8.0`, or `normal_diametral_pitch` of helical gears, stands for the module
-25.4 mm / 8. Variables and results are in the units of the tables below.
+`face_width_in = 1.5` or `amount_in = 0.0005`, `_lbf_in` or `_lbf_ft` for one in N m, as in `torque_lbf_in = 450.0`,
+`_psi` or `_ksi` for one in MPa. `diametral_pitch = 8.0`, or `normal_diametral_pitch` of helical gears, stands for the
+module 25.4 mm / 8. Variables and results are in the units of the tables below.
 """
 _QUANTITIES = "Quantities"
 

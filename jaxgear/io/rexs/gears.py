@@ -30,9 +30,9 @@ _ISO_53 = "basic rack of ISO 53"
 _TOOL = "rack_shaped_tool"
 _DEDENDUM_DIGITS = 9  # behind the point: further ones are of the way through the root diameter
 QUALITY = "global_tolerance_class_iso_1328_2013"
-# What a gear of the library has not: it must be absent or zero. (component, attribute, unit)
+_CHAMFER = "chamfer_at_tooth_end"
+# What the making of a gear of the library has not: it must be absent or zero. (component, attribute, unit)
 _NOT_HERE = (
-    ("cylindrical_gear", "chamfer_at_tooth_end", "mm"),
     ("rack_shaped_tool", "protuberance_amount", "mm"),
     ("rack_shaped_tool", "protuberance_amount_factor", "none"),
     ("rack_shaped_tool", "protuberance_height", "mm"),
@@ -100,11 +100,15 @@ def read_gear(model: Model, gear: Component, flank: Component, owner: str, compl
         DesignFileError: for what is missing or not of the library.
     """
     tool, settings = _manufacturing(model, flank, owner, completed)
-    for part in (gear, flank, tool, settings):
+    for part in (tool, settings):
         for kind, name, unit in _NOT_HERE:
             if part.type == kind and (value := part.number(name, unit)):
                 problem = f"{value:g} must be 0, the library has no such tooth"
-                raise part.refuse(name, problem if part is gear else f"{problem}; {_rack_by_hand(owner)}")
+                raise part.refuse(name, f"{problem}; {_rack_by_hand(owner)}")
+    width = f"{owner}.face_width"
+    if (chamfer := gear.number(_CHAMFER, "mm")) and width not in completed.given:
+        problem = f"{chamfer:g} must be 0, the library has no such tooth; or give the width without: --set {width}=MM"
+        raise gear.refuse(_CHAMFER, problem)
     module = gear.needed("normal_module", "mm")
     if not module > 0:
         raise gear.refuse("normal_module", f"{module:g} mm must be greater than 0 mm")

@@ -31,7 +31,9 @@ TOOL = {
     "root_radius": ("tip_corner_radius_factor_reference_profile", "none"),
 }
 STAGE = {"center_distance": ("center_distance", "mm")}
-_KEYS = [*(f"{gear}.{name}" for gear in ("pinion", "wheel") for name in (GEAR | FLANK | TOOL)), "pair.center_distance"]
+OFFSET = "pair.axial_offset"  # for which REXS has no place
+_KEYS = [f"{gear}.{name}" for gear in ("pinion", "wheel") for name in (GEAR | FLANK | TOOL)]
+_KEYS += ["pair.center_distance", OFFSET]
 
 
 @dataclass

@@ -18,7 +18,7 @@ from ..toml import content
 from .container import is_container, unpacked
 from .gears import QUALITY, check_external, read_gear, read_quality
 from .json_form import parse_json
-from .open_numbers import FLANK, GEAR, STAGE, Completed
+from .open_numbers import FLANK, GEAR, OFFSET, STAGE, Completed
 from .read_flank import read_modification
 from .rexs_model import Component, Model, parse
 from .topography import joined
@@ -75,10 +75,10 @@ def read_rexs(
 
     Modifications are those of version 1.4 or later; before, a file that has some is refused.
 
-    Both gears are taken as centred on each other. What the file leaves open of a gear is completed, in files of all
-    versions alike, and logged: the dedendum by the root diameter, else that of the basic rack of ISO 53, as the root
-    radius and the addendum; bore and material as those that `Gear` has without them. A modification that is given at
-    other places than the ends of the library's flank goes on to these by its own law.
+    Both gears are taken as centred on each other unless an axial offset is given. What the file leaves open of a gear
+    is completed, in files of all versions alike, and logged: the dedendum by the root diameter, else that of the basic
+    rack of ISO 53, as the root radius and the addendum; bore and material as those that `Gear` has without them. A
+    modification that is given at other places than the ends of the library's flank goes on to these by its own law.
 
     Helix angles are positive for a right hand. Left and right flanks are seen from the datum face (ISO 21771): a pinion
     that drives with its right flanks turns clockwise from there. Face coordinates of the library are then those of the
@@ -92,8 +92,9 @@ def read_rexs(
         load_case: id of the load case, needed where the file has several.
         given: numbers in place of those of the file, by their keys in a design file and in the units there:
             teeth, module, pressure_angle, profile_shift, helix_angle, face_width, addendum, dedendum, root_radius,
-            tip_diameter, tip_form_diameter and bore_diameter of pinion and wheel, as "pinion.tip_diameter", and
-            "pair.center_distance". With dedendum and root_radius the tools of the file are not read.
+            tip_diameter, tip_form_diameter and bore_diameter of pinion and wheel, as "pinion.tip_diameter",
+            "pair.center_distance" and "pair.axial_offset". With dedendum and root_radius the tools of the file are not
+            read, with face_width chamfered tooth ends are not.
 
     Raises:
         DesignFileError: for whatever is wrong with the file or not of this library, in one line that names component
@@ -163,11 +164,14 @@ def read_stage(model: Model, stage: int | None, flank: str | None, completed: Co
     flanks = [_flank(model, gear, flank) for gear in gears]
     pinion, wheel = (read_gear(model, *each, completed) for each in zip(gears, flanks, _NAMES))
     distance = chosen.needed("center_distance", "mm")
-    pair: GearPair = refused(chosen.where(), GearPair, pinion, wheel, distance)
+    offset = completed.given.get(OFFSET, 0.0)
+    if OFFSET in completed.given:
+        completed.say(OFFSET, offset, "given")
+    pair: GearPair = refused(chosen.where(), GearPair, pinion, wheel, distance, axial_offset=offset)
     width, common = float(pair.face_width), chosen.number("common_face_width", "mm")
     if common is not None and abs(common - width) > 1e-6 * width:
-        problem = f"{common:g} mm must be the smaller face width, {width:g} mm: the gears are centred on each other"
-        raise chosen.refuse("common_face_width", problem)
+        centred = "" if offset else f": the gears are centred on each other, or give --set {OFFSET}=MM"
+        raise chosen.refuse("common_face_width", f"{common:g} mm must be the common one, {width:g} mm{centred}")
     turned = [1, 1] if pair.is_spur else [_mirror(gear, flank) for gear in gears]
     sides = [
         (gear, face, replace(frame, mirror=mirror))
