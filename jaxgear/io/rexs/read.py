@@ -50,7 +50,6 @@ class RexsPair:
         torque: on the pinion [N m], None where the file names none.
         speed: of the pinion [rpm], likewise.
         quality_classes: flank tolerance classes of pinion and wheel (ISO 1328-1:2013), None where a gear has none.
-        completed: numbers that the file leaves open and those that were given, in words, by their keys.
     """
 
     title: str
@@ -60,7 +59,6 @@ class RexsPair:
     torque: float | None
     speed: float | None
     quality_classes: tuple[int, int] | None
-    completed: Mapping[str, str]
 
 
 def read_rexs(
@@ -104,10 +102,11 @@ def read_rexs(
     file = Path(path)
     with naming(file):
         model = model_of(file)
-        found = _read(model, stage, flank, load_case, Completed(given or {}))
+        completed = Completed(given or {})
+        found = _read(model, stage, flank, load_case, completed)
     said = (part for several in (model.components, *model.cases.values()) for part in several.values())
-    if found.completed:
-        shown = ", ".join(f"{key} = {value}" for key, value in found.completed.items())
+    if completed.numbers:
+        shown = ", ".join(f"{key} = {value}" for key, value in completed.numbers.items())
         _LOG.warning("%s: numbers beside those of the file: %s; --set KEY=VALUE gives others", file, shown)
     silent = list(dict.fromkeys(place for part in said for place in part.without_unit))
     if silent:
@@ -129,8 +128,7 @@ def _read(model: Model, stage: int | None, flank: str | None, load_case: int | N
     torque, speed = _load(model, found.stage, found.gears[0], load_case)
     units = [part for part in model.components.values() if part.type == "gear_unit"]
     title = units[0].text("model_name") if units else ""
-    classes = _classes(found.gears)
-    return RexsPair(title, found.pair, *found.modifications, torque, speed, classes, completed.numbers)
+    return RexsPair(title, found.pair, *found.modifications, torque, speed, _classes(found.gears))
 
 
 class Stage(NamedTuple):

@@ -1,6 +1,6 @@
 """Stages of a REXS file: which of them are pairs of this library, and why others are not."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -29,7 +29,7 @@ class RexsStage:
         module: normal module of gear 1 [mm], None where the file names none.
         helix_angle: of gear 1 on the reference cylinder [deg], likewise.
         center_distance: [mm], likewise.
-        completed: keys of the numbers that the file leaves open, see `RexsPair`.
+        completed: numbers that the file leaves open and `read_rexs` takes, in words, by their keys in a design file.
         problem: why the stage is not read, "" where it is.
     """
 
@@ -40,7 +40,7 @@ class RexsStage:
     module: float | None
     helix_angle: float | None
     center_distance: float | None
-    completed: tuple[str, ...]
+    completed: Mapping[str, str]
     problem: str
 
 
@@ -82,7 +82,7 @@ def _stage(model: Model, stage: Component) -> RexsStage:
         module=_number(first, "normal_module", "mm"),
         helix_angle=_number(first, "helix_angle_reference_diameter", "deg"),
         center_distance=_number(stage, "center_distance", "mm"),
-        completed=tuple(completed.numbers),
+        completed=completed.numbers,
         problem=problem,
     )
 
