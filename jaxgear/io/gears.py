@@ -93,9 +93,8 @@ def materials_of(given: Mapping[str, Part] | None) -> Materials:
 def flank_of(section: GearSection, folder: Path, gear: Part) -> list[Part]:
     """The modifications of a gear; paths begin in the folder."""
     given = section.modification
-    if not any(isinstance(each, FlankFileSection) for each in given):
-        return list(given)
-    base_radius = None if gear.free() else float(gear.build({}).base_radius)
+    has_files = any(isinstance(each, FlankFileSection) for each in given)
+    base_radius = float(gear.build({}).base_radius) if has_files and not gear.free() else None
     return [flank_part(each, folder, base_radius) if isinstance(each, FlankFileSection) else each for each in given]
 
 

@@ -60,7 +60,8 @@ def metric(
     if all(name in units for name in data):
         return dict(data), {}
     known = names(units)
-    found, written = dict(data), {}
+    found: dict[str, Any] = dict(data)
+    written: dict[str, str] = {}
     for name, value in data.items():
         if name in units or name not in known:
             continue

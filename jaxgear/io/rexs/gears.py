@@ -258,8 +258,8 @@ def _manufacturing(model: Model, flank: Component, owner: str, completed: Comple
         raise flank.refuse("", problem)
     if tools[0].type != _TOOL:
         raise tools[0].refuse("", f"makes a flank, must be a {_TOOL}; {_rack_by_hand(owner)}")
-    known = model.related("manufacturing_step", "workpiece", flank.id, "manufacturing_settings")
-    return completed.of(owner, tools[0], TOOL), known[0] if known else settings
+    found = model.related("manufacturing_step", "workpiece", flank.id, "manufacturing_settings")
+    return completed.of(owner, tools[0], TOOL), found[0] if found else settings
 
 
 def _rack_by_hand(owner: str) -> str:
