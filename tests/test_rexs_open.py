@@ -2,6 +2,7 @@
 
 import contextlib
 import io
+import random
 import re
 import zipfile
 from types import SimpleNamespace
@@ -135,6 +136,11 @@ def test_containers_are_read_and_written(tmp_path, whole, monkeypatch):
     ):
         with pytest.raises(DesignFileError, match=re.escape(problem)):
             read_rexs(archive(tmp_path / "bad.rexsz", members))
+    held, rng = container.packed(b"<model/>" * 400, "a.rexs"), random.Random(1)
+    for _ in range(500):
+        place = rng.randrange(4, len(held))
+        with contextlib.suppress(DesignFileError):  # nothing else
+            container.unpacked(held[:place] + bytes([rng.randrange(256)]) + held[place + 1 :])
     damaged = tmp_path / "damaged.zip"
     damaged.write_bytes(path.read_bytes()[:-30])
     with pytest.raises(DesignFileError, match=r"damaged.zip: is not a valid zip archive: "):

@@ -4,6 +4,7 @@ Nothing is unpacked to the disk, so that names of members are no paths, and no m
 """
 
 import io
+import struct
 import zipfile
 import zlib
 from pathlib import PurePosixPath
@@ -15,6 +16,10 @@ MODELS = (".rexs", ".xml", ".rexsj", ".json")
 _START = b"PK\x03\x04"
 _MOST = 256 * 2**20  # of a model [bytes]: a gearbox of a hundred gears has a few million
 _MOST_MEMBERS = 10_000
+_ENCRYPTED = 0x1  # flag of a member
+_KNOWN = zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED
+# what Python raises for one, a version that it does not know and offsets beyond the file included
+_DAMAGED = zipfile.BadZipFile, zlib.error, EOFError, ValueError, IndexError, NotImplementedError, struct.error
 
 
 def is_container(held: bytes) -> bool:
@@ -34,14 +39,14 @@ def unpacked(held: bytes) -> bytes:
             if len(archive.infolist()) > _MOST_MEMBERS:
                 raise DesignFileError("", f"holds {len(archive.infolist())} files, must be at most {_MOST_MEMBERS}")
             found = _model(archive)
+            if found.flag_bits & _ENCRYPTED or found.compress_type not in _KNOWN:
+                raise DesignFileError("", f"{found.filename}: is encrypted or compressed otherwise than by deflate")
             with archive.open(found) as member:
                 content = member.read(_MOST + 1)
-    except (zipfile.BadZipFile, zlib.error, EOFError) as error:
-        raise DesignFileError("", f"is not a valid zip archive: {error}") from None
-    except (RuntimeError, NotImplementedError):  # of a password, or of a compression that Python does not know
-        raise DesignFileError(
-            "", "is encrypted or compressed in an unknown way: unpack it and give the model"
-        ) from None
+    except DesignFileError:
+        raise
+    except _DAMAGED as error:
+        raise DesignFileError("", f"is not a valid zip archive: {str(error) or 'it ends too early'}") from None
     if len(content) > _MOST:
         raise DesignFileError("", f"{found.filename}: expands to more than {_MOST >> 20} MiB")
     return content

@@ -116,7 +116,8 @@ def read_gear(model: Model, gear: Component, flank: Component, owner: str, compl
     for name, unit, wanted in (("normal_module", "mm", module), ("normal_pressure_angle", "deg", angle)):
         given = tool.number(name, unit)
         if given is not None and abs(given - wanted) > _CLOSE * wanted:
-            raise tool.refuse(name, f"{given:g} {unit} must be that of the gear, {wanted:g} {unit}")
+            problem = f"{given:g} {unit} must be that of the gear, {wanted:g} {unit}; {_rack_by_hand(owner)}"
+            raise tool.refuse(name, problem)
     attribute, _ = FLANK["profile_shift"]
     profile_shift = _relative(flank, attribute, module)
     if profile_shift is None:
@@ -124,7 +125,7 @@ def read_gear(model: Model, gear: Component, flank: Component, owner: str, compl
     generated = settings.number("generated_addendum_modification_coefficient", "none")
     if generated is not None and abs(generated - profile_shift) > _CLOSE:
         problem = f"{generated:g} must be the profile shift coefficient of the finished gear, {profile_shift:g}"
-        raise settings.refuse("generated_addendum_modification_coefficient", problem)
+        raise settings.refuse("generated_addendum_modification_coefficient", f"{problem}; {_rack_by_hand(owner)}")
     options = {
         "teeth": gear.needed("number_of_teeth", "none"),
         "module": module,
