@@ -58,7 +58,7 @@ def _read_csv(path: Path) -> Rows:
             lines = file.read().splitlines(keepends=True)
         while lines and (not lines[0].strip() or lines[0].startswith("#")):
             del lines[0]
-        delimiter = next((mark for mark in ("\t", ";") if lines and mark in lines[0]), ",")
+        delimiter = max((",", ";", "\t"), key=lines[0].count) if lines else ","
         found = [row for row in csv.reader(lines, delimiter=delimiter) if any(map(str.strip, row))]
     except UnicodeDecodeError:
         raise DesignFileError("", "is not text in UTF-8") from None
