@@ -101,6 +101,22 @@ def test_a_rack_by_hand_stands_for_tools_that_are_not_read(tmp_path, whole):
     assert [float(gear.dedendum) for gear in found.gears] == [1.4, 1.4] and float(found.wheel.root_radius) == 0.25
 
 
+def test_a_generating_profile_shift_tells_the_tooth_thickness(tmp_path, whole):
+    """x_E = x + A_sn / (2 m tan(alpha)): 0.02 less are 43.68 um of module 3; beside limits it lies between theirs."""
+    name = "generated_addendum_modification_coefficient"
+    thin = whole.replace(f'id="{name}" unit="none">0.0<', f'id="{name}" unit="none">-0.02<', 1)
+    found = read(tmp_path, thin).pair.pinion
+    assert float(found.tooth_thickness_allowance) == pytest.approx(-6000 * 0.02 * np.tan(np.deg2rad(20)), abs=1e-6)
+    limits = "".join(f'<attribute id="{end}_backlash_allowance_referenced_to_span" unit="mum">{value}</attribute>'
+                     for end, value in (("upper", -30), ("lower", -60)))  # fmt: skip
+    both = thin.replace('<attribute id="number_of_teeth"', f'{limits}<attribute id="number_of_teeth"', 1)
+    assert float(read(tmp_path, both).pair.pinion.tooth_thickness_tolerance) == pytest.approx(31.925, abs=1e-3)
+    for text, value in ((both, -0.05), (whole, 0.01)):
+        wrong = re.sub(rf'(id="{name}" unit="none">)[-.0-9]*<', rf"\g<1>{value}<", text, count=1)
+        with pytest.raises(DesignFileError, match=f"{name}: {value} must be at least .* or give the rack: --set pin"):
+            read(tmp_path, wrong)
+
+
 def test_chamfers_and_an_offset_of_the_faces_are_given(tmp_path, whole):
     chamfered = whole.replace('<attribute id="number_of_teeth"', '<attribute id="chamfer_at_tooth_end" unit="mm">0.5'
                               '</attribute><attribute id="number_of_teeth"', 1)  # fmt: skip

@@ -30,6 +30,8 @@ _ISO_53 = "basic rack of ISO 53"
 _TOOL = "rack_shaped_tool"
 _DEDENDUM_DIGITS = 9  # behind the point: further ones are of the way through the root diameter
 QUALITY = "global_tolerance_class_iso_1328_2013"
+_GENERATED = "generated_addendum_modification_coefficient"
+_SHIFT_DIGITS = 1e-3  # by which profile shifts in files are rounded
 _CHAMFER = "chamfer_at_tooth_end"
 # What the making of a gear of the library has not: it must be absent or zero. (component, attribute, unit)
 _NOT_HERE = (
@@ -122,10 +124,6 @@ def read_gear(model: Model, gear: Component, flank: Component, owner: str, compl
     profile_shift = _relative(flank, attribute, module)
     if profile_shift is None:
         raise flank.missing(attribute)
-    generated = settings.number("generated_addendum_modification_coefficient", "none")
-    if generated is not None and abs(generated - profile_shift) > _CLOSE:
-        problem = f"{generated:g} must be the profile shift coefficient of the finished gear, {profile_shift:g}"
-        raise settings.refuse("generated_addendum_modification_coefficient", f"{problem}; {_rack_by_hand(owner)}")
     options = {
         "teeth": gear.needed("number_of_teeth", "none"),
         "module": module,
@@ -146,18 +144,23 @@ def read_gear(model: Model, gear: Component, flank: Component, owner: str, compl
         )
         raise gear.refuse("inner_diameter", problem)
     material = _material(model, gear, owner, completed)
-    return _complete(gear, owner, options, material, completed)
+    return _complete(gear, settings, owner, options, material, completed)
 
 
 def _complete(
-    gear: Component, owner: str, options: dict[str, float | None], material: Material, completed: Completed
+    gear: Component,
+    settings: Component,
+    owner: str,
+    options: dict[str, float | None],
+    material: Material,
+    completed: Completed,
 ) -> Gear:
     """The gear of the numbers of a file, None for what it leaves open, which is completed and taken down."""
 
     def made() -> Gear:
         given = {name: value for name, value in options.items() if value is not None}
         found: Gear = refused(gear.where(), Gear, **given, material=material)
-        return refused(gear.where(), replace, found, **_thickness(gear, found))
+        return _as_cut(settings, refused(gear.where(), replace, found, **_thickness(gear, found)), owner, completed)
 
     found, root = made(), gear.number("root_diameter", "mm")
     if options["dedendum"] is None and root is not None:
@@ -174,6 +177,29 @@ def _complete(
         if options[name] is None:
             completed.say(f"{owner}.{name}", float(value), why)
     return found
+
+
+def _as_cut(settings: Component, made: Gear, owner: str, completed: Completed) -> Gear:
+    """The gear with the tooth thickness of its generating profile shift, where no deviation tells another.
+
+    x_E = x + A_sn / (2 m_n tan(alpha_n)) (ISO 21771) of a file is that of an allowance A_sn between both limits.
+    """
+    generated = settings.number(_GENERATED, "none")
+    if generated is None:
+        return made
+    shift, upper, tolerance = (
+        float(number) for number in (made.profile_shift, made.tooth_thickness_allowance, made.tooth_thickness_tolerance)
+    )
+    thinner = 2e3 * float(made.module) * np.tan(np.deg2rad(float(made.pressure_angle)))  # um, for a shift of 1
+    if not upper and not tolerance and generated < shift - _CLOSE:
+        allowance = round(float(thinner * (generated - shift)), _ALLOWANCE_DIGITS)
+        completed.say(f"{owner}.tooth_thickness_allowance", allowance, f"um, by {_GENERATED}")
+        return refused(settings.where(_GENERATED), replace, made, tooth_thickness_allowance=real(allowance))
+    least = shift + (upper - tolerance) / thinner
+    if not least - _SHIFT_DIGITS <= generated <= shift + _CLOSE:
+        problem = f"{generated:g} must be at least {least:g}, that of the tooth thickness, and at most {shift:g}, x"
+        raise settings.refuse(_GENERATED, f"{problem}; {_rack_by_hand(owner)}")
+    return made
 
 
 def read_quality(gear: Component) -> int | None:
@@ -226,7 +252,7 @@ def write_gear(
     settings = model.add(
         "cylindrical_gear_manufacturing_settings",
         f"{name} settings",
-        generated_addendum_modification_coefficient=(gear.profile_shift, "none"),
+        **{_GENERATED: (gear.profile_shift, "none")},
     )
     flanks = [
         model.add(
