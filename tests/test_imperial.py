@@ -1,6 +1,8 @@
 """Imperial numbers in design files: the key says the unit, and nothing is taken in another one."""
 
 import functools
+import subprocess
+import sys
 
 import jax
 import numpy as np
@@ -100,3 +102,14 @@ def test_a_helical_gear_has_a_normal_pitch(load):
     text = GEARS.replace("[pinion]\ndiametral", "[pinion]\nhelix_angle = 15.0\nnormal_diametral")
     text = text.replace("center_distance_in = 3.75", "center_distance_in = 3.9")
     assert float(load(text).pair().wheel.module) == 3.175
+
+
+@pytest.mark.slow
+def test_a_command_in_a_fresh_process_takes_them(tmp_path):
+    """Whatever it looks at before the library is imported: the value is refused, not the key."""
+    path = tmp_path / "gear.toml"
+    path.write_text(GEARS.replace("face_width_in = 1.5", "face_width_in = -1.5"))
+    done = subprocess.run(
+        [sys.executable, "-m", "jaxgear", "analyze", path], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 2 and "pinion.face_width_in: -38.1 mm must be greater than 0 mm" in done.stderr
