@@ -297,7 +297,7 @@ def test_errors_in_other_units_are_lengths_on_the_line_of_action(tmp_path, headi
     lines = rows(columns | {heading.format(shaft): np.zeros(16)}).splitlines()
     texts = [lines[0], *(line[:-1] + repr(float(scale * value)) for line, value in zip(lines[1:], GOOD["te_um"]))]
     (tmp_path / "te.csv").write_text("\n".join(texts), encoding="utf-8")
-    read = read_measurement(tmp_path / "te.csv", mesh().pair, noise=0.2)
+    read = read_measurement(tmp_path / "te.csv", gear_pair(), noise=0.2)
     np.testing.assert_allclose(read.transmission_error, GOOD["te_um"], rtol=1e-12)
 
 

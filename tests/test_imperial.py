@@ -98,6 +98,7 @@ def test_nothing_is_taken_in_another_unit(load, old, new, problem):
     assert problem in str(caught.value)
 
 
+@pytest.mark.slow
 def test_a_helical_gear_has_a_normal_pitch(load):
     text = GEARS.replace("[pinion]\ndiametral", "[pinion]\nhelix_angle = 15.0\nnormal_diametral")
     text = text.replace("center_distance_in = 3.75", "center_distance_in = 3.9")
