@@ -245,7 +245,8 @@ def film_thickness(cycle: MeshCycle, lubricant: Lubricant) -> Load:
 
     with the normal relative radius rho [mm] of the involutes, the sum v of the rolling speeds, the pressure p of the
     cycle times the square root of the load factor; viscosity eta and its pressure coefficient alpha at the bulk
-    temperature, in S also at the contact temperature. Where the contact is hotter than any oil (510 degC) there is no film.
+    temperature, in S also at the contact temperature. Where the contact is hotter than any oil (510 degC) there is no
+    film.
 
     References:
         D. Dowson, G. R. Higginson, Elasto-hydrodynamic Lubrication, 1966; ISO/TS 6336-22 (ISO/TR 15144-1), method A.

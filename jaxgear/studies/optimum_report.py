@@ -271,7 +271,7 @@ def _overloads(unusual: Iterable[Finding], optimum: Optimum) -> Iterator[tuple[s
         name = _LIMITED.get(finding.key)
         if name is not None and name not in optimum.constraints:
             limit = f'[[optimize.constraint]] with of = "{name}", high = {finding.usual.high:g}'
-            yield "NOT FOR USE", f"{finding.key} {finding.number} exceeds {finding.usual.high:g} MPa; limit it: {limit}"
+            yield "overload", f"{finding.key} {finding.number} exceeds {finding.usual.high:g} MPa; limit it: {limit}"
 
 
 def _rounding(file: DesignFile, optimum: Optimum) -> Iterator[tuple[str, str]]:
