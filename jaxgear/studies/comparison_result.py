@@ -108,6 +108,8 @@ class ComparisonResult(AbstractStudyResult):
 
     def _notes(self) -> Iterator[str]:
         yield from manufactured.lines(self.design, self.evaluations)
+        if self.design.coast:
+            yield "coast flanks: contact runs from pinion tip to pinion root, positions count against the rotation"
         if self.quick:
             yield "quick run, coarse positions and a short search: a preview, do not use for design"
         if self.unverified:

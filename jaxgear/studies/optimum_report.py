@@ -253,7 +253,7 @@ def first_screen(
     gained = [*gains(evaluations, optimum.problem), *_rounding(file, optimum)]
     if front is not None and optimum.problem is not None:
         gained += front_rows(front, [of.sign for of in optimum.problem.objectives], evaluations)
-    yield Table(("", ""), tuple(gained), f"Gain at {file.torque:g} N m: unmodified -> {name}")
+    yield Table(("", ""), tuple(gained), f"Gain at {file.load_in_words}: unmodified -> {name}")
     judged_by = (
         *_feasibility(optimum),
         *_bounds(file, optimum),
