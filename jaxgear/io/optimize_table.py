@@ -303,13 +303,13 @@ class OptimizeRequest:
     def over_life(self, settings: Wear) -> "OptimizeRequest | None":
         """The search of the same variables for the least mean PPTE over the life at the design torque.
 
-        One gradient search, since every step of it wears a life. None where flanks are sought without variables, and
+        One gradient search without rounding, since every step of it wears a life. None where flanks are sought without variables, and
         where the file asks for a quantity of worn flanks itself.
         """
         asked = self._common.get("objective", "ppte")
         if self.method not in METHODS or (isinstance(asked, Quantity) and asked.name in WEAR_QUANTITIES):
             return None
-        kept = {name: value for name, value in self._common.items() if name in ("constraints", "seed", "rounding")}
+        kept = {name: value for name, value in self._common.items() if name in ("constraints", "seed")}
         kept |= {"torque": self._design.spectrum(OptimizeSection("optimize")), "positions": None}
         kept |= {"objective": settings.quantity(_LASTING), "method": METHODS[_DEFAULT_METHOD](**_OVER_LIFE)}
         return dataclasses.replace(self, method=_DEFAULT_METHOD, _common=kept)
