@@ -8,7 +8,6 @@ from jaxgear.io import DesignFileError, load_design
 from jaxgear.studies import DesignAnalysis
 from jaxgear.studies.study import AbstractStudy
 
-
 FILE = """
 [pinion]
 teeth = 19

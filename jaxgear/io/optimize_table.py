@@ -303,8 +303,8 @@ class OptimizeRequest:
     def over_life(self, settings: Wear) -> "OptimizeRequest | None":
         """The search of the same variables for the least mean PPTE over the life at the design torque.
 
-        One gradient search without rounding, since every step of it wears a life. None where flanks are sought without variables, and
-        where the file asks for a quantity of worn flanks itself.
+        One gradient search without rounding, since every step of it wears a life. None where flanks are sought without
+        variables, and where the file asks for a quantity of worn flanks itself.
         """
         asked = self._common.get("objective", "ppte")
         if self.method not in METHODS or (isinstance(asked, Quantity) and asked.name in WEAR_QUANTITIES):
