@@ -5,7 +5,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import equinox as eqx
 import numpy as np
@@ -42,6 +42,8 @@ from .template import Free, Part, build
 from .toml import read
 from .value_types import list_of, table, text
 from .variables import VariableSection, increasing, read_variables
+
+T = TypeVar("T")
 
 # Tooth pairs are carried along up to this many times the deflection of a single pair after ISO 6336-1.
 _DEFLECTIONS = 2.0
@@ -394,6 +396,11 @@ def load_design(path: str | Path) -> DesignFile:
     return design
 
 
+def _only(names: set[str], of: Mapping[str, T]) -> dict[str, T]:
+    """The items of some names."""
+    return {name: value for name, value in of.items() if name in names}
+
+
 def _check_coast(says: Mapping[str, Any], torque: float) -> None:
     """Refuses what holds for drive flanks alone."""
     for name in _OF_DRIVE_FLANKS:
@@ -408,10 +415,10 @@ def _read(file: Path, says: dict[str, Any]) -> DesignFile:
     folder, load = file.parent, top.load
     if load.torque_range is not None:
         increasing("load.torque_range[1]", load.torque_range[0], load.torque_range[1], unit=" N m")
-    coast = isinstance(load.torque, float) and load.torque < 0
-    if coast:
+    coast = False
+    if not isinstance(load.torque, Free) and load.torque < 0:
         _check_coast(says, load.torque)
-        load = load.changed(torque=-load.torque)
+        load, coast = load.changed(torque=-load.torque), True
     materials = materials_of(top.materials)
     sections = {"pinion": top.pinion, "wheel": top.wheel}
     flanks = {name: flank_of(section, folder, coast=coast) for name, section in sections.items()}
@@ -426,7 +433,7 @@ def _read(file: Path, says: dict[str, Any]) -> DesignFile:
     behind = [free for part in others for free in part.free()]
     bounds, units, values = read_variables(top.variables, [*open_flanks, *open_case, *behind], empty)
     used = {free.name for free in (*open_flanks, *open_case)}  # others are of the flanks that carry nothing
-    bounds, units, values = ({key: kept[key] for key in kept if key in used} for kept in (bounds, units, values))
+    bounds, units, values = _only(used, bounds), _only(used, units), _only(used, values)
     middle = {name: 0.5 * (low + high) for name, (low, high) in bounds.items()}
     usual_pair, usual = pair.build(middle), point.build(middle)
     longest = longest_path(usual_pair, pair, bounds)

@@ -114,7 +114,7 @@ def minimize(
     if not (isinstance(objective, str) or callable(objective)):
         raise ValueError("minimize: objective must be one quantity; jaxgear.optimize.pareto finds a front of several")
     began = time.perf_counter()
-    steps = check_steps("minimize", rounding, bounds)
+    rounded_to = check_steps("minimize", rounding, bounds)
     posed = make_problem(
         design,
         bounds,
@@ -130,5 +130,5 @@ def minimize(
     record = Record(posed, callback)
     method.search(posed, record)
     record.check()
-    found = refined(record, method.polish, positions, steps)
-    return optimum_of(found.record, method.name, began, found.change, unrounded=found.unrounded, steps=steps)
+    found = refined(record, method.polish, positions, rounded_to)
+    return optimum_of(found.record, method.name, began, found.change, unrounded=found.unrounded, steps=rounded_to)

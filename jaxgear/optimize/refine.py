@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from types import MappingProxyType
 from typing import NamedTuple, TypeVar
 
 import numpy as np
@@ -40,7 +41,9 @@ class Refined(NamedTuple):
     unrounded: Record
 
 
-def refined(record: Record, polish: Polish, positions: int | None, steps: Mapping[str, float]) -> Refined:
+def refined(
+    record: Record, polish: Polish, positions: int | None, steps: Mapping[str, float] = MappingProxyType({})
+) -> Refined:
     """Goes on from the best design of a record on a finer mesh, see `on_finer_meshes`, and ends on the steps.
 
     Where none of the designs met keeps all limits, one that does is sought whatever its objective is.
