@@ -402,7 +402,7 @@ def _only(names: set[str], of: Mapping[str, T]) -> dict[str, T]:
 
 
 def _check_coast(says: Mapping[str, Any], torque: float) -> None:
-    """Refuses what holds for drive flanks alone."""
+    """Raises a `DesignFileError` for tables that know the drive flanks alone."""
     for name in _OF_DRIVE_FLANKS:
         if name in says:
             problem = f"{torque:g} N m is carried by the coast flanks, {_ONLY_DRIVE.format(f'[{name}]')}"

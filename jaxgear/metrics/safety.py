@@ -93,7 +93,7 @@ def _safety(owner: str, strength: Strength, name: Mode, stress: Any) -> tuple[Re
 
 
 def _stress_factor(strength: Strength, name: Mode) -> Scalar:
-    """By which the load factor raises a stress: a pressure grows with the square root of the load."""
+    """Ratio of a stress with the load factor to that without: a pressure grows with the square root of the load."""
     return strength.load_factor if name == "bending" else jnp.sqrt(strength.load_factor)
 
 
