@@ -11,6 +11,8 @@ import jaxgear as jg
 from jaxgear.io import DesignFileError, load_design, optimize_request
 from jaxgear.optimize import Constraint, search
 from jaxgear.optimize.problem import Score
+from jaxgear.optimize.refine import refined
+from jaxgear.optimize.result import Rounding
 from jaxgear.optimize.rounding import check_steps, rounded
 from jaxgear.studies.optimum_report import _rounding
 
@@ -71,6 +73,26 @@ def test_before_rounding_is_the_optimum_without_it(known):
     result = known.minimize(known.parabolas, BOX, rounding=STEPS)
     assert result.rounding.objective == exact.objective and result.rounding.parameters == exact.parameters
     assert result.evaluations > exact.evaluations and exact.rounding is None and "before rounding" in str(result)
+
+
+def test_a_step_that_breaks_a_limit_is_not_taken(monkeypatch):
+    """Between 3.1 and 3.4 there is no multiple of 1: the optimum keeps its digits, and the verdict says so."""
+
+    def scores(problem, points):
+        inside = np.abs(np.asarray(points)[:, 0] * 10 - 3.25) < 0.15
+        return Score(np.zeros((len(points), 1)), np.where(inside, 0.0, 1.0))
+
+    monkeypatch.setattr(search, "scores", scores)
+    problem = SimpleNamespace(
+        names=("a",), low=np.zeros(1), high=np.full(1, 10.0), cases=SimpleNamespace(count=1), mesh=None
+    )
+    record = search.Record(problem, None)
+    record.judge(np.array([[0.33]]))
+    found = refined(record, lambda *_: None, None, {"a": 1.0})
+    assert found.record is found.unrounded is record and record.point == 0.33
+    kept = SimpleNamespace(rounding=Rounding({}, {"a": 3.3}, 0.0))
+    ((_, row),) = _rounding(SimpleNamespace(units={}), kept)
+    assert row.startswith("none: no design on the steps")
 
 
 @pytest.mark.slow

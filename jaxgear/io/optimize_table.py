@@ -148,7 +148,7 @@ class OptimizeSection(FurtherTable):
         manufactured: pairs of manufactured gears under every torque; needs [tolerance].
         seed: of random searches and of the manufactured gears.
         starts: searches, of methods "slp", "adam" and "lbfgs".
-        steps: most steps of every search, of the same methods.
+        steps: most steps of every search, of the same methods; the result is in those of [optimize.rounding].
         application_factor: K_A of the rule-based relief.
         verify: whether the designs are evaluated with the finite-element structure too; without it they are where the
             gears can be meshed. A quick run never does.

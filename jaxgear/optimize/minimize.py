@@ -131,4 +131,6 @@ def minimize(
     method.search(posed, record)
     record.check()
     found = refined(record, method.polish, positions, rounded_to)
-    return optimum_of(found.record, method.name, began, found.change, unrounded=found.unrounded, steps=rounded_to)
+    unrounded = found.unrounded if rounded_to else None
+    taken = {} if found.record is found.unrounded else rounded_to
+    return optimum_of(found.record, method.name, began, found.change, unrounded=unrounded, steps=taken)

@@ -33,7 +33,8 @@ class Refined(NamedTuple):
     Attributes:
         record: of the finest mesh, with all that was spent; of the design on the steps.
         change: of the objective at twice the positions; NaN where it was not evaluated.
-        unrounded: of the finest mesh before the variables were rounded; the same as `record` without steps.
+        unrounded: of the finest mesh before the variables were rounded; the same as `record` without steps, and where
+            no design on them keeps the limits that it keeps.
     """
 
     record: Record
@@ -56,7 +57,7 @@ def refined(
     """
     if positions is None:
         _kept_to_limits(record, polish)
-        return Refined(rounded(record, steps, polish) if steps else record, float("nan"), record)
+        return Refined(_on_steps(record, steps, polish), float("nan"), record)
     problem = record.problem
 
     def end_on(mesh: Mesh) -> tuple[Refined, bool]:
@@ -65,7 +66,7 @@ def refined(
         polish(found.problem, found, record.point)
         found.check()
         _kept_to_limits(found, polish)
-        record, ends = found, rounded(found, steps, polish) if steps else found
+        record, ends = found, _on_steps(found, steps, polish)
         values, violations = at_more_positions(ends, ends.point[None])
         found.evaluations = ends.evaluations
         change = problem.objectives[0].sign * float(values[0, 0] - ends.value)
@@ -73,6 +74,14 @@ def refined(
         return Refined(ends, change, found), fine_enough(*now, values, violations)
 
     return on_finer_meshes("minimize", problem.mesh, positions, end_on)
+
+
+def _on_steps(record: Record, steps: Mapping[str, float], polish: Polish) -> Record:
+    """The best design on the steps, or that of the record without steps and where rounding breaks a limit."""
+    if not steps:
+        return record
+    found = rounded(record, steps, polish)
+    return record if counted(found.violation) > counted(record.violation) else found
 
 
 def on_finer_meshes(owner: str, mesh: Mesh, positions: int, end_on: Callable[[Mesh], tuple[Found, bool]]) -> Found:

@@ -76,7 +76,8 @@ class Rounding(Checked):
     """How the parameters of an optimum were rounded, and what they were before.
 
     Attributes:
-        steps: of the rounded parameters, in the units of their bounds.
+        steps: of the rounded parameters, in the units of their bounds; none where no design on the steps was found that
+            keeps the limits.
         parameters: value of every free parameter before.
         objective: before, in its unit, on the same mesh.
     """
@@ -163,7 +164,7 @@ class Optimum(eqx.Module):
 
     def _rows(self):
         yield self.objective_name, f"{self.objective:.4g} {self.objective_unit}".rstrip()
-        if self.rounding is not None:
+        if self.rounding is not None and self.rounding.steps:
             yield "before rounding", f"{self.rounding.objective:.4g} {self.objective_unit}".rstrip()
         if self.objective_name != "ppte":
             yield "PPTE", f"{self.ppte:.4g} um"

@@ -47,7 +47,8 @@ def optimum_of(
         began: when the search began, as `time.perf_counter` tells.
         grid_change: of the objective at twice the positions.
         left: decrease that is left, where it is known.
-        unrounded: record of the search before its variables were rounded to the `steps`; None without steps.
+        unrounded: record of the search before its variables were rounded; None where they were not to be.
+        steps: to which they were rounded.
     """
     problem = record.problem
     x = np.asarray(record.point, np.dtype(problem.low.dtype))
@@ -59,7 +60,7 @@ def optimum_of(
     several = len(problem.objectives) > 1
     sign = 1 if several else problem.objectives[0].sign
     rounding = None
-    if unrounded is not None and steps:
+    if unrounded is not None:
         record.evaluations = unrounded.evaluations
         exact = {name: float(value) for name, value in problem.parameters(unrounded.point).items()}
         rounding = Rounding(dict(steps), exact, sign * unrounded.value)

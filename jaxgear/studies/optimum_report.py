@@ -279,6 +279,9 @@ def _rounding(file: DesignFile, optimum: Optimum) -> Iterator[tuple[str, str]]:
     rounding = optimum.rounding
     if rounding is None:
         return
+    if not rounding.steps:
+        yield "rounding", "none: no design on the steps was found that keeps all limits, the variables have all digits"
+        return
     steps = dict.fromkeys(f"{step:g} {file.units[name]}".rstrip() for name, step in rounding.steps.items())
     kept = [name for name in optimum.parameters if name not in rounding.steps]
     digits = f"; all digits: {', '.join(kept)}" if kept else ""
