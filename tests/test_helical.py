@@ -47,6 +47,28 @@ def test_geometry_is_that_of_published_pairs():
     assert float(virtual) == pytest.approx(18.9051, abs=5e-5)
 
 
+def test_coast_flanks_are_the_drive_flanks_in_a_mirror():
+    """The lead slope that eases one end for the drive flanks eases the other end for the coast flanks."""
+    mesh, drive = solved(slope=6.0)
+    behind = jg.prepare(mesh.pair.coast, compliance=mesh.compliance, resolution=mesh.resolution)
+    behind = replace(behind, alternates=mesh.alternates)
+    tip = jg.TipRelief(0.0, 4.0)
+    coast = jg.solve(behind, TORQUE, pinion=jg.LeadSlope(-6.0) + tip, wheel=tip)
+    np.testing.assert_allclose(coast.transmission_error, drive.transmission_error, rtol=1e-12)
+    np.testing.assert_allclose(coast.line_load[:, ::-1], drive.line_load, rtol=1e-10, atol=1e-9)
+    np.testing.assert_allclose(np.sum(coast.pair_force, axis=0), coast.force, rtol=1e-12)
+    same = jg.solve(behind, TORQUE, pinion=jg.LeadSlope(6.0) + tip, wheel=tip)
+    assert float(jg.peak_to_peak(same.transmission_error)) != float(jg.peak_to_peak(drive.transmission_error))
+    assert mesh.pair.coast.coast == mesh.pair and float(mesh.pair.coast.path_slope) == -float(mesh.pair.path_slope)
+
+
+def test_in_python_a_negative_torque_says_where_the_coast_flanks_are():
+    with pytest.raises(
+        ValueError, match="torque = -50 N m must be at least 0 N m; for the coast flanks prepare the pair"
+    ):
+        jg.solve(solved()[0], -50.0)
+
+
 def test_coefficients_are_of_the_normal_module():
     gear = jg.Gear(30, 2.0, 20.0, 0.4, face_width=10.0, helix_angle=20.0)
     cosine = np.cos(np.deg2rad(20.0))

@@ -263,6 +263,24 @@ def test_lubrication_by_the_transverse_path_and_the_normal_radius():
     assert float(metrics.friction_coefficient(cycle, OIL)) == pytest.approx(friction, rel=1e-9)
 
 
+def test_friction_and_heat_of_a_published_pair_under_load_factors():
+    """A 5 MW stage: mu of ISO/TR 15144-1 is printed as .030, the bulk temperature of the nominal power as 85.0 degC."""
+    pair = jg.GearPair(
+        jg.Gear(24, 14.0, 20.0, 0.48, face_width=360.0, helix_angle=10.0, tip_diameter=380.747),
+        jg.Gear(95, 14.0, 20.0, 0.6691, face_width=360.0, helix_angle=-10.0, tip_diameter=1395.376),
+        center_distance=861.0,
+    )
+    moving, point = kinematics(pair, jnp.zeros(()), SIZES, "strain"), OperatingPoint(40953.0, 1165.9)
+    cycle = eqx.tree_at(lambda c: (c.kinematics, c.operating_point), running(), (moving, point))
+    factor = 1.25 * 1.0923 * 1.15 * 1.0693  # K_A K_v K_Hbeta K_Halpha as printed
+    oil = metrics.Lubricant(220.0, 19.0, 80.0, 0.6, density=890.0, friction="iso_6336_22", load_factor=factor)
+    friction = float(metrics.friction_coefficient(cycle, oil))
+    assert friction == pytest.approx(0.03003, abs=5e-5)
+    assert float(metrics.helical_load_factor(pair)) == pytest.approx(1.274, abs=5e-4)
+    loss = 5000.0 * friction * float(metrics.ohlendorf_loss_factor(pair))  # kW
+    assert 80.0 + 7400.0 * (loss / 861.0 / 360.0) ** 0.72 / 1.2 == pytest.approx(85.0, abs=0.05)
+
+
 def test_rules_take_the_transverse_angle_and_the_oblique_stiffness():
     pair, torque = example(), 9000.0
     load = 127352.0 / 100.0

@@ -158,6 +158,30 @@ def test_friction_by_hand(cycle, law, factor):
     assert float(metrics.friction_coefficient(cycle, pao)) == pytest.approx(0.8 * expected, rel=1e-9)
 
 
+def test_load_factors_strain_the_film_but_do_not_heat(cycle):
+    """They count for friction, flash temperature and pressure; power loss and its heat are those of the torque."""
+    plain = dataclasses.replace(OIL, friction="iso_6336_22", bulk="loss")
+    loaded = dataclasses.replace(plain, load_factor=1.7)
+    rubs = 1.7**0.2
+
+    def ratio(of, offset=0.0):
+        before, after = (np.asarray(of(cycle, oil)) - offset for oil in (plain, loaded))
+        return np.max(after) / np.max(before)
+
+    assert ratio(metrics.friction_coefficient) == pytest.approx(rubs, rel=1e-9)
+    assert ratio(metrics.loss_power) == pytest.approx(rubs, rel=1e-9)
+    assert ratio(metrics.bulk_temperature, 80.0) == pytest.approx(rubs**0.72, rel=1e-9)
+    assert ratio(metrics.lubricated_flash_temperature) == pytest.approx(rubs * 1.7**0.75, rel=1e-9)
+    assert np.min(metrics.film_thickness(cycle, loaded)) < np.min(metrics.film_thickness(cycle, plain))
+    schlenk = dataclasses.replace(loaded, friction="schlenk")
+    assert float(metrics.friction_coefficient(cycle, schlenk)) == float(metrics.friction_coefficient(cycle, OIL))
+    few = metrics.Strength(1500.0, bending=900.0, pressure=2000.0)
+    many = dataclasses.replace(few, load_factor=1.7)
+    for name, power in (("pinion_pitting_safety", 0.5), ("wheel_root_safety", 1.0), ("pressure_safety", 0.5)):
+        safe, strained = (float(strength.quantity(name)(cycle)) for strength in (few, many))
+        assert safe / strained == pytest.approx(1.7**power, rel=1e-9), name
+
+
 def test_friction_scales_with_the_powers_of_its_law(cycle):
     def logarithm(x):
         torque, speed, roughness, density = jnp.exp(x)

@@ -104,6 +104,7 @@ def _stages(stages: Iterable[RexsStage]) -> Table:
 
 def _to_rexs(source: Path, target: Path) -> None:
     design = load_design(source)
+    design.check_drive("jaxgear convert")
     free = [name for name in design.bounds if design.open_case or name not in design.values]
     if free:
         problem = f"convert needs numbers, these are free: {', '.join(free)}; give each a value"
@@ -124,6 +125,7 @@ def _to_rexs(source: Path, target: Path) -> None:
     _say(target, design.pair())
     tables = read(source)
     left = [f"[{name}]" for name in tables if name not in _TAKEN]
+    left += [f"{gear}.coast_modification" for gear in ("pinion", "wheel") if "coast_modification" in tables[gear]]
     left += [f"load.{name}" for name in tables["load"] if name not in _LOAD]
     if left:
         terminal.say(f"left out, REXS has no place for it: {', '.join(left)}")

@@ -216,7 +216,7 @@ def write(
     warnings = [*chosen.failures, *([f"{failed} variants failed and have no results"] if failed else [])]
     pages = [_side_by_side(best), *(_page(table, best, place, chosen) for place in range(min(CHOSEN, len(best))))]
     data: dict[str, Any] = {
-        "torque_Nm": design.torque,
+        "torque_Nm": design.signed_torque,
         "torque_range_Nm": design.torque_range,
         "speed_rpm": design.speed,
         "friction": design.friction,

@@ -4,7 +4,7 @@ import jax
 import numpy as np
 from jaxtyping import Array, Float
 
-from ..numerics import Checked, Given, check, number, real
+from ..numerics import Checked, Given, check, concrete, number, real
 
 Scalar = Float[Array, ""]
 
@@ -40,6 +40,12 @@ def operating_point_of(owner: str, torque: Torque, dtype: np.dtype) -> Operating
         if torque.ndim:
             raise ValueError(
                 f"{owner}: torque has shape {torque.shape}, must be a single number; solve for many with jax.vmap"
+            )
+        known = concrete(torque)
+        if known is not None and known < 0:
+            raise ValueError(
+                f"{owner}: torque = {known:g} N m must be at least 0 N m; for the coast flanks prepare the pair's "
+                "`coast` and give the amount of the torque"
             )
         check(owner, "torque", torque, "N m", low=0.0)
         torque = OperatingPoint(torque)

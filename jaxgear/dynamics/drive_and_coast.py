@@ -8,9 +8,9 @@ from jaxtyping import Array, Float
 
 from ..contact import Mesh, RemovedMaterial, removed_material, solve_removed
 from ..contact.mesh import prepare_from
-from ..geometry import Gear, GearPair, tooth_thickness
+from ..geometry import tooth_thickness
 from ..microgeometry import AbstractModification
-from ..numerics import changed, program
+from ..numerics import program
 
 Scalar = Float[Array, ""]
 Curve = Float[Array, " positions"]
@@ -84,19 +84,11 @@ def coast_flanks(mesh: Mesh, torque: Scalar, modification: Both) -> Flanks:
     """
     pair, sizes = mesh.pair, mesh.resolution
     first, shift, play = _coast_phase(mesh)
-    turned = prepare_from(first, _other_hand(pair), mesh.compliance, sizes, None, mesh.even)
+    turned = prepare_from(first, pair.coast, mesh.compliance, sizes, None, mesh.even)
     pinion, wheel = modification
     removed = removed_material(turned, torque, pinion=pinion, wheel=wheel)
     order = (shift - jnp.arange(sizes.positions)) % sizes.positions
     return Flanks(turned, removed, order, play)
-
-
-def _other_hand(pair: GearPair) -> GearPair:
-    def turned(gear: Gear) -> Gear:
-        return gear if gear.helix_angle is None else changed(gear, helix_angle=-gear.helix_angle)
-
-    pinion, wheel = map(turned, pair.gears)
-    return changed(pair, pinion=pinion, wheel=wheel)
 
 
 @program

@@ -130,6 +130,20 @@ class GearPair(Checked):
         return self.pinion.base_pitch
 
     @property
+    def coast(self) -> "GearPair":
+        """Pair whose drive flanks are the coast flanks of this one, seen in a mirror: gears of the other hand.
+
+        The wheel drives on them where the pinion goes on turning as it did: under a negative torque on the pinion. The
+        amount of that torque is then the torque, and modifications are those of the coast flanks, at the same face
+        coordinates. While the gears turn on, mesh positions count backwards: contact begins at the tip of the pinion,
+        E, and ends at its root, A, so that approach and recess change places.
+        """
+        pinion, wheel = (
+            gear if gear.helix_angle is None else changed(gear, helix_angle=-gear.helix_angle) for gear in self.gears
+        )
+        return changed(self, pinion=pinion, wheel=wheel)
+
+    @property
     def is_spur(self) -> bool:
         """Whether both gears are known to be spur gears."""
         return all(gear.is_spur for gear in self.gears)

@@ -5,7 +5,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import equinox as eqx
 import numpy as np
@@ -44,6 +44,8 @@ from .toml import read
 from .value_types import list_of, table, text
 from .variables import VariableSection, increasing, read_variables
 
+T = TypeVar("T")
+
 # Tooth pairs are carried along up to this many times the deflection of a single pair after ISO 6336-1.
 _DEFLECTIONS = 2.0
 # A mesh force has to be known up to these, which vibration reaches.
@@ -53,6 +55,10 @@ _OPEN_PAIRS = 4
 # Torques of interest where the file names none, relative to the design torque.
 _TORQUE_RANGE = (0.5, 2.0)
 
+
+# Tables that know the drive flanks alone: the line of action of their force, or the order in which positions follow.
+_OF_DRIVE_FLANKS = "dynamics", "layout", "misalignment", "teeth", "wear"
+_ONLY_DRIVE = "which {} does not know: give a positive torque"
 
 _MISALIGNMENT = section_of(Misalignment)
 
@@ -145,6 +151,7 @@ class FileMesh(eqx.Module):
     model: Part
     misalignment: Part
     resolution: Resolution
+    coast: bool = eqx.field(static=True)
 
     def free(self) -> list[Free]:
         """Every open number."""
@@ -159,7 +166,8 @@ class FileMesh(eqx.Module):
     def __call__(self, parameters: Mapping[str, Any]) -> Mesh:
         """The mesh."""
         parts = self.parts(parameters)
-        return prepare(parts.pair, compliance=parts.compliance, resolution=self.resolution, support=parts.support)
+        pair = parts.pair.coast if self.coast else parts.pair
+        return prepare(pair, compliance=parts.compliance, resolution=self.resolution, support=parts.support)
 
 
 @dataclass(frozen=True)
@@ -170,7 +178,9 @@ class DesignFile:
         path: the file.
         says: all that it held when it was read, as one text.
         title: free text, the file's stem if it has none.
-        torque: design torque on the pinion [N m]; the middle of its bounds where it is a variable.
+        torque: amount of the design torque on the pinion [N m]; the middle of its bounds where it is a variable.
+        coast: whether the torque is negative: mesh and modifications are those of the coast flanks, see
+            `GearPair.coast`, while `pair` has the gears of the file.
         torque_range: lowest and highest torque of interest [N m].
         speed: of the pinion [rpm], None if the file names none; the middle of its bounds where it is a variable.
         friction: mean coefficient of friction; None for the library's default.
@@ -189,6 +199,7 @@ class DesignFile:
     says: str
     title: str
     torque: float
+    coast: bool
     torque_range: tuple[float, float]
     speed: float | None
     friction: float | None
@@ -246,6 +257,27 @@ class DesignFile:
             parameters: value of every free parameter, they may be tracers; None for the middle of their bounds.
         """
         return self._middle.pair if parameters is None else self._mesh.pair.build(parameters)
+
+    @property
+    def _meshing(self) -> GearPair:
+        """The pair as the flanks that carry the torque see it."""
+        return self._middle.pair.coast if self.coast else self._middle.pair
+
+    @property
+    def signed_torque(self) -> float:
+        """Design torque on the pinion [N m], negative on the coast flanks."""
+        return -self.torque if self.coast else self.torque
+
+    @property
+    def load_in_words(self) -> str:
+        """The design torque, with the flanks that carry it where they are the coast flanks."""
+        return f"{self.signed_torque:g} N m{', coast flanks,' * self.coast}"
+
+    def check_drive(self, owner: str) -> None:
+        """Raises a `DesignFileError` for coast flanks, which a command or a table does not know."""
+        if self.coast:
+            problem = f"{self.signed_torque:g} N m is carried by the coast flanks, {_ONLY_DRIVE.format(owner)}"
+            raise DesignFileError("load.torque", problem, self.path)
 
     def resolution(self, torque: float | None = None) -> Resolution:
         """The array sizes that the file asks for, with as few tooth pairs as the load needs where it names none.
@@ -318,11 +350,11 @@ class DesignFile:
             support = self._middle.support if rigid else self._support(sizes)
         options = {"compliance": self._middle.compliance, "resolution": sizes, "support": support}
         with naming(self.path):
-            return refused("resolution", prepare, self._middle.pair, **options)
+            return refused("resolution", prepare, self._meshing, **options)
 
     def begin_contact(self, first: Resolution, resolution: Resolution) -> None:
         """Starts to compile what prepares and solves the mesh, see `contact.begin_contact`."""
-        begin_contact(self._middle.pair, self._middle.compliance, first, resolution, self._support(first))
+        begin_contact(self._meshing, self._middle.compliance, first, resolution, self._support(first))
 
     def sweep_mesh(self, resolution: Resolution) -> Mesh | Callable[[Mapping[str, Any]], Mesh]:
         """The prepared mesh; a function of the parameters that prepares it where numbers of the gears are free."""
@@ -365,24 +397,48 @@ def load_design(path: str | Path) -> DesignFile:
     return design
 
 
+def _only(names: set[str], of: Mapping[str, T]) -> dict[str, T]:
+    """The items of some names."""
+    return {name: value for name, value in of.items() if name in names}
+
+
+def _check_coast(says: Mapping[str, Any], torque: float) -> None:
+    """Raises a `DesignFileError` for tables that know the drive flanks alone."""
+    for name in _OF_DRIVE_FLANKS:
+        if name in says:
+            problem = f"{torque:g} N m is carried by the coast flanks, {_ONLY_DRIVE.format(f'[{name}]')}"
+            raise DesignFileError("load.torque", problem)
+
+
 def _read(file: Path, says: dict[str, Any]) -> DesignFile:
     further = {name: cls for name, cls in further_tables().items() if name not in FileSection.keys}
     top = decode("", says, file_section(further))
     folder, load = file.parent, top.load
     if load.torque_range is not None:
         increasing("load.torque_range[1]", load.torque_range[0], load.torque_range[1], unit=" N m")
+    coast = False
+    if not isinstance(load.torque, Free) and load.torque < 0:
+        _check_coast(says, load.torque)
+        load, coast = load.changed(torque=-load.torque), True
     materials = materials_of(top.materials)
     sections = {"pinion": top.pinion, "wheel": top.wheel}
     check_pitches(top.pinion, top.wheel)
     pair = pair_of(top.pair, *(gear_part(section, materials) for section in sections.values()))
-    flanks = {name: flank_of(section, folder, pair.fields[name]) for name, section in sections.items()}
+    flanks, unused = (
+        {name: flank_of(section, folder, pair.fields[name], coast=side) for name, section in sections.items()}
+        for side in (coast, not coast)
+    )
+    others = [part for parts in unused.values() for part in parts]
     axes, point = part_of(top.misalignment, Misalignment), part_of(load, OperatingPoint)
     model = model_part(top.model)
     open_case = [*pair.free(), *model.free(), *axes.free(), *point.free()]
     modifications = [*flanks["pinion"], *flanks["wheel"]]
     empty = [f"{name}.modification" for name, section in sections.items() if section.given().get("modification") == []]
     open_flanks = [free for part in modifications for free in part.free()]
-    bounds, units, values = read_variables(top.variables, [*open_flanks, *open_case], empty)
+    behind = [free for part in others for free in part.free()]
+    bounds, units, values = read_variables(top.variables, [*open_flanks, *open_case, *behind], empty)
+    used = {free.name for free in (*open_flanks, *open_case)}  # others are of the flanks that carry nothing
+    bounds, units, values = _only(used, bounds), _only(used, units), _only(used, values)
     middle = {name: 0.5 * (low + high) for name, (low, high) in bounds.items()}
     usual_pair, usual = pair.build(middle), point.build(middle)
     longest = longest_path(usual_pair, pair, bounds)
@@ -410,7 +466,7 @@ def _read(file: Path, says: dict[str, Any]) -> DesignFile:
         support = gearbox.support_of(*shafts, direction=layout.direction, **options)
     sizes = resolution_of(top.resolution, uneven, bent=layout is not None and len(top.meshes) < 2, longest=longest)
     model = with_tables(model, top.model, folder, pair, usual_pair)  # last, as it takes longer than all the rest
-    mesh = FileMesh(pair, model, axes, sizes)
+    mesh = FileMesh(pair, model, axes, sizes, coast)
     classes = tables["tolerance"].quality_class if "tolerance" in tables else quality
     low, high = load.torque_range or [share * torque for share in _TORQUE_RANGE]
     return DesignFile(
@@ -418,6 +474,7 @@ def _read(file: Path, says: dict[str, Any]) -> DesignFile:
         says=json.dumps(says, sort_keys=True, default=str),
         title=top.title or printable(file.stem),
         torque=torque,
+        coast=coast,
         torque_range=(low, high),
         speed=None if usual.speed is None else float(usual.speed),
         friction=None if usual.friction is None else float(usual.friction),

@@ -27,7 +27,7 @@ _LONGEST: Mapping[str, Callable[[tuple[float, float]], float]] = {
     "face_width": max,
     "module": min,
 }
-_WITHOUT_FLANKS = "modification", "quality_class"
+_WITHOUT_FLANKS = "modification", "coast_modification", "quality_class"
 
 _ThicknessKeys = section_of(ToothThickness, most=(("teeth_spanned", 1000),))
 _GearKeys = section_of(Gear, ("material", "tooth_thickness_allowance"))
@@ -62,7 +62,10 @@ class GearSection(_ThicknessKeys, _GearKeys):  # type: ignore[misc, valid-type]
         ball_diameter: D_M.
         material: name in [materials], "STEEL", or elastic constants.
         quality_class: flank tolerance class of ISO 1328-1, of [tolerance], [layout] and the charts.
-        modification: modifications of the flank; several add up.
+        modification: modifications of both flanks of every tooth, or of the drive flanks alone where the coast flanks
+            have their own; several add up.
+        coast_modification: modifications of the coast flanks, which carry a negative `load.torque`; an empty list for
+            involutes, those of the drive flanks without it. No other command sees them.
     """
 
     source = Gear
@@ -70,6 +73,9 @@ class GearSection(_ThicknessKeys, _GearKeys):  # type: ignore[misc, valid-type]
     material: str | Part | None = entry(MATERIAL)
     quality_class: int | None = entry(QUALITY_CLASS)
     modification: list[Part | FlankFileSection] = entry(list_of(Kind("a table", _modification), empty=True), [])
+    coast_modification: list[Part | FlankFileSection] | None = entry(
+        list_of(Kind("a table", _modification), empty=True)
+    )
 
 
 class PairSection(section_of(GearPair, ("pinion", "wheel"))):  # type: ignore[misc]
@@ -90,9 +96,10 @@ def materials_of(given: Mapping[str, Part] | None) -> Materials:
     return {_STEEL: Part(Material, {}, "material"), **(given or {})}
 
 
-def flank_of(section: GearSection, folder: Path, gear: Part) -> list[Part]:
-    """The modifications of a gear; paths begin in the folder."""
-    given = section.modification
+def flank_of(section: GearSection, folder: Path, gear: Part, *, coast: bool) -> list[Part]:
+    """The modifications of the drive or coast flanks of a gear; paths begin in the folder."""
+    own = section.coast_modification if coast else None
+    given = section.modification if own is None else own
     has_files = any(isinstance(each, FlankFileSection) for each in given)
     base_radius = float(gear.build({}).base_radius) if has_files and not gear.free() else None
     return [flank_part(each, folder, base_radius) if isinstance(each, FlankFileSection) else each for each in given]

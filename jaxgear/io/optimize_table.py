@@ -21,6 +21,7 @@ from ..optimize import (
 )
 from ..optimize.free_form import CURVES
 from ..optimize.refine import POSITIONS
+from ..optimize.rounding import check_steps, multiples
 from ..vocabulary import quantity_of
 from ..wear import WEAR_QUANTITIES, Wear
 from ..wear.quantities import MOST_LIVES
@@ -120,6 +121,20 @@ def method_options() -> dict[str, type[FileTable]]:
     return {name: section for name, section in found.items() if section.keys}
 
 
+class RoundingSection(FileTable):
+    """Steps in which the result is wanted, such as a shop can make; 0 for all digits.
+
+    Attributes:
+        amount: of the variables in um.
+        length: of the variables in mm.
+        variables: steps of single variables by their names, each in the unit of its variable.
+    """
+
+    amount: float = entry(real(Number("um", low=0.0)), 0.5)
+    length: float = entry(real(Number("mm", low=0.0)), 0.1)
+    variables: dict[str, float] | None = entry(table(real(Number(low=0.0))))
+
+
 class OptimizeSection(FurtherTable):
     """A search for the best values of the variables, or for flanks without any; what `jaxgear optimize` does.
 
@@ -133,10 +148,11 @@ class OptimizeSection(FurtherTable):
         manufactured: pairs of manufactured gears under every torque; needs [tolerance].
         seed: of random searches and of the manufactured gears.
         starts: searches, of methods "slp", "adam" and "lbfgs".
-        steps: most steps of every search, of the same methods.
+        steps: most steps of every search, of the same methods; the result is in those of [optimize.rounding].
         application_factor: K_A of the rule-based relief.
         verify: whether the designs are evaluated with the finite-element structure too; without it they are where the
             gears can be meshed. A quick run never does.
+        rounding: steps of the variables in which the search ends.
         constraint: limits of quantities or of combinations of variables.
     """
 
@@ -154,6 +170,7 @@ class OptimizeSection(FurtherTable):
     steps: int | None = entry(count(10, 100_000))
     application_factor: float = entry(real(Number(low=0.0, high=100.0, open_low=True)), 1.0)
     verify: bool | None = entry(switch())
+    rounding: RoundingSection | None = entry(nested(RoundingSection))
     constraint: list[ConstraintSection] = entry(list_of(nested(ConstraintSection), empty=True), [])
 
     @classmethod
@@ -181,6 +198,7 @@ class OptimizeSection(FurtherTable):
         _objectives(design, self)
         _measure(self)
         _constraints(design, self)
+        _rounding(design, self)
         design.spectrum(self)
 
     def options(self, method: str) -> dict[str, Any]:
@@ -190,9 +208,9 @@ class OptimizeSection(FurtherTable):
 
     @classmethod
     def inner(cls) -> dict[str, type[FileTable]]:
-        """Constraints, and options of the methods."""
+        """Constraints, rounding, and options of the methods."""
         options = {f"[optimize.{name}]": section for name, section in method_options().items()}
-        return {"[[optimize.constraint]]": ConstraintSection, **options}
+        return {"[[optimize.constraint]]": ConstraintSection, "[optimize.rounding]": RoundingSection, **options}
 
 
 def optimize_of(design: DesignFile) -> OptimizeSection:
@@ -285,8 +303,8 @@ class OptimizeRequest:
     def over_life(self, settings: Wear) -> "OptimizeRequest | None":
         """The search of the same variables for the least mean PPTE over the life at the design torque.
 
-        One gradient search, since every step of it wears a life. None where flanks are sought without variables, and
-        where the file asks for a quantity of worn flanks itself.
+        One gradient search without rounding, since every step of it wears a life. None where flanks are sought without
+        variables, and where the file asks for a quantity of worn flanks itself.
         """
         asked = self._common.get("objective", "ppte")
         if self.method not in METHODS or (isinstance(asked, Quantity) and asked.name in WEAR_QUANTITIES):
@@ -355,6 +373,10 @@ def _request(design: DesignFile, method: str | None, quick: bool) -> OptimizeReq
         common |= options | fewer
     else:
         common["method"] = _made_by(name)(**options | fewer)
+    if name in METHODS:
+        common["rounding"] = _rounding(design, section)
+    elif method is None:
+        section.refuse(["rounding"], f' with method "{name}"')
     if quick:  # a quick look stays on its mesh
         common["positions"] = None
     return OptimizeRequest(name, curve, verify, design, common)
@@ -429,6 +451,24 @@ def _constraint(design: DesignFile, section: ConstraintSection) -> Constraint:
         if limit is not None and (problem := outside(Number(unit), limit)):
             raise DesignFileError(f"{key}.{name}", problem)
     return refused(key, Constraint, of, low=section.low, high=section.high)
+
+
+_STEPS = {"um": "amount", "mm": "length"}  # keys of [optimize.rounding] by the unit of the variables
+
+
+def _rounding(design: DesignFile, section: OptimizeSection) -> dict[str, float]:
+    """Steps of the variables; a default without a multiple within the bounds gives way."""
+    asked = section.rounding or RoundingSection("optimize.rounding")
+    steps: dict[str, float] = {}
+    for name, key in ((name, _STEPS[unit]) for name, unit in design.units.items() if unit in _STEPS):
+        step = getattr(asked, key)
+        if step and (key in asked.given() or multiples(step, *design.bounds[name])):
+            steps[name] = step
+    for name in asked.variables or {}:
+        if name not in design.bounds:
+            problem = f'"{name}" is not a variable, {suggestion(name, design.bounds)}'
+            raise DesignFileError(f"{asked.at}.variables", problem)
+    return refused(asked.at, check_steps, "optimize", {**steps, **(asked.variables or {})}, design.bounds)
 
 
 def _check_reachable(design: DesignFile, key: str, of: str | Quantity, low: float | None) -> None:

@@ -36,3 +36,5 @@ class StrengthSection(SettingsTable, section_of(Strength, open=False)):  # type:
         """Refuses a table without any stress."""
         if not self.given().keys() - {FILE}:
             raise DesignFileError("strength", "is empty; it gives the permissible stresses")
+        if not self.given().keys() - {FILE, "load_factor"}:
+            raise DesignFileError("strength.load_factor", "has no effect without permissible stresses")

@@ -20,23 +20,36 @@ from .model_table import ModelSection
 from .table_keys import FileTable, built, decode, descendants, entry, section_of
 from .template import Free
 from .toml import read
-from .value_types import list_of, positive, real, text
+from .value_types import Kind, list_of, positive, real, text
 
 FILE = "file"  # key of a table that stands in a file of its own
+
+
+def _either_side() -> Kind:
+    """A torque of either sign, but not zero; a variable stands for a positive one."""
+    amount = real(Number("N m", low=0.0, open_low=True), open=True)
+
+    def read(key: str, value: Any) -> Any:
+        negative = isinstance(value, int | float) and value < 0
+        return -amount.read(key, -value) if negative else amount.read(key, value)
+
+    return Kind(amount.words, read, Number("N m"))
 
 
 class LoadSection(section_of(OperatingPoint)):  # type: ignore[misc]
     """Under what the pair runs.
 
     Attributes:
-        torque: design torque on the pinion.
+        torque: design torque on the pinion, not zero. A negative one is carried by the coast flanks, which analyze,
+            optimize and sweep then take in place of the drive flanks, with the `coast_modification` of the gears where
+            they have one; all other torques of the file are amounts.
         torque_range: lowest and highest torque of interest; half and twice the design torque without it.
         speed: of the pinion, for temperatures, film and loss.
         friction: mean coefficient of friction, for efficiency and, with a speed, loss and temperatures; in place of the
             law of [lubricant].
     """
 
-    torque: float | Free = entry(real(Number("N m", low=0.0, open_low=True), open=True), ...)
+    torque: float | Free = entry(_either_side(), ...)
     torque_range: list[float] | None = entry(list_of(positive("N m"), length=2))
 
 

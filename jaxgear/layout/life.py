@@ -93,7 +93,7 @@ def damage(
     """Damage of both gears under a duty cycle, K_Hbeta of every load by the one-dimensional analysis.
 
     Stresses are those of `metrics.nominal_contact_stress` with K_Hbeta and of `metrics.nominal_root_stress` with
-    K_Fbeta. Dynamic and application factors belong into the torques.
+    K_Fbeta. Dynamic and application factors are the `load_factor` of the strength.
     Differentiable in everything.
 
     Args:

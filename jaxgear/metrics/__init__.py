@@ -50,6 +50,7 @@ from .lubrication import contact_temperature as contact_temperature
 from .lubrication import film_thickness as film_thickness
 from .lubrication import flash_temperature as flash_temperature
 from .lubrication import friction_coefficient as friction_coefficient
+from .lubrication import helical_load_factor as helical_load_factor
 from .lubrication import loss_factor as loss_factor
 from .lubrication import loss_power as loss_power
 from .lubrication import lubricated_flash_temperature as lubricated_flash_temperature

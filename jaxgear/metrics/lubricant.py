@@ -70,6 +70,9 @@ class Lubricant(AbstractSettings):
         cooling_factor: X_S of that law, 1 for dip and 1.2 for spray lubrication.
         permissible_film: specific film thickness lambda_GFP below which micropitting is to be expected, from a test.
         scuffing_temperature: contact temperature at which the oil fails, from a test.
+        load_factor: product of the load factors, K_A K_gamma K_v K_Hbeta K_Halpha as far as the contact analysis does
+            not know them, for friction by ISO, flash temperature and film. The power loss, and with `bulk` = "loss" the
+            bulk temperature, count the torque itself.
     """
 
     table = "lubricant"
@@ -85,6 +88,7 @@ class Lubricant(AbstractSettings):
     cooling_factor: Scalar = number("", low=0.0, high=10.0, default=1.0)
     permissible_film: Scalar | None = number("", low=0.0, open_low=True, optional=True, default=None)
     scuffing_temperature: Scalar | None = number("degC", low=0.0, high=2000.0, optional=True, default=None)
+    load_factor: Scalar = number("", low=0.0, high=100.0, open_low=True, default=1.0)
 
     def check_together(self) -> None:
         _check_less(self, "viscosity_100", "viscosity_40", "mm2/s")

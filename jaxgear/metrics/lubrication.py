@@ -129,12 +129,13 @@ def friction_coefficient(cycle: MeshCycle, lubricant: Lubricant) -> Scalar:
 
         mu = c (w / (v rho))^0.2 eta^-0.05 X_R X_L
 
-    with the line load w = F_bt / b [N/mm], the sum of both rolling speeds v [m/s] and the normal relative radius rho
-    [mm] at the pitch point, and the viscosity eta [mPa s] at the temperature of the oil. By `lubricant.friction`,
+    with the line load w [N/mm], the sum of both rolling speeds v [m/s] and the normal relative radius rho [mm] at the
+    pitch point, and the viscosity eta [mPa s] at the temperature of the oil. By `lubricant.friction`, with the load
+    factors K of the lubricant and `helical_load_factor` K_Bgamma,
 
-        "schlenk"      c = 0.048, X_R = Ra^0.25
-        "iso_6336_20"  c = 0.060, X_R = Ra^0.25
-        "iso_6336_22"  c = 0.045, X_R = 2.2 (Ra / rho)^0.25
+        "schlenk"      c = 0.048, X_R = Ra^0.25,               w = F_bt / b
+        "iso_6336_20"  c = 0.060, X_R = Ra^0.25,               w = K F_bt / b
+        "iso_6336_22"  c = 0.045, X_R = 2.2 (Ra / rho)^0.25,   w = K K_Bgamma F_bt / b
 
     A coefficient that the cycle was solved with (`OperatingPoint.friction`) counts in its place.
 
@@ -156,17 +157,34 @@ def friction_coefficient(cycle: MeshCycle, lubricant: Lubricant) -> Scalar:
     viscosity = 1e3 * lubricant.viscosity(lubricant.temperature)
     match lubricant.friction:
         case "iso_6336_22":
+            line_load = line_load * lubricant.load_factor * helical_load_factor(cycle.kinematics.pair)
             surface = _ISO_22 * _ISO_22_ROUGHNESS * (lubricant.roughness / radius) ** 0.25
         case "iso_6336_20":
+            line_load = line_load * lubricant.load_factor
             surface = _ISO_20 * lubricant.roughness**0.25
         case _:
             surface = _SCHLENK * lubricant.roughness**0.25
     return surface * safe_power(line_load / (rolling * radius), 0.2) * viscosity**-0.05 * lubricant.slipperiness
 
 
+def helical_load_factor(pair: GearPair) -> Scalar:
+    """Helical load factor K_Bgamma of scuffing and micropitting, by the total contact ratio eps_gamma.
+
+        1 up to 2,   1 + 0.2 sqrt((eps_gamma - 2) (5 - eps_gamma)),   1.3 from 3.5 on
+
+    References:
+        ISO/TS 6336-21 (ISO/TR 13989-2); ISO/TS 6336-22 (ISO/TR 15144-1).
+    """
+    ratio = jnp.clip(path_of_contact(pair).contact_ratio + pair.overlap_ratio, 2.0, 3.5)
+    return 1 + 0.2 * safe_sqrt((ratio - 2) * (5 - ratio))
+
+
 @over_batch
 def loss_power(cycle: MeshCycle, lubricant: Lubricant | None = None) -> Scalar:
     """Power loss by friction of the flanks [W]: input power * coefficient of friction * loss factor H_VL.
+
+    Power and loss factor are those of the torque of the cycle: load factors of the lubricant raise the coefficient
+    alone.
 
     Args:
         cycle: solved mesh cycle, with a speed.
@@ -190,9 +208,10 @@ def mesh_efficiency(cycle: MeshCycle, lubricant: Lubricant | None = None) -> Sca
 
 @over_batch
 def lubricated_flash_temperature(cycle: MeshCycle, lubricant: Lubricant) -> Load:
-    """`flash_temperature` [K] with the coefficient of friction of a lubricant."""
+    """`flash_temperature` [K] with the coefficient of friction of a lubricant, at line loads times its load factor."""
     speed = _running("flash_temperature", cycle)
-    return flash_temperature(cycle, speed, friction=friction_coefficient(cycle, lubricant))
+    rise = flash_temperature(cycle, speed, friction=friction_coefficient(cycle, lubricant))
+    return rise * lubricant.load_factor**0.75  # heat over the square root of the contact width
 
 
 @over_batch
@@ -225,8 +244,9 @@ def film_thickness(cycle: MeshCycle, lubricant: Lubricant) -> Load:
         G = alpha E_r,  U = eta v / (2 E_r rho),  W = 2 pi p^2 / E_r^2,  S = (alpha eta at the contact) / (alpha eta)
 
     with the normal relative radius rho [mm] of the involutes, the sum v of the rolling speeds, the pressure p of the
-    cycle; viscosity eta and its pressure coefficient alpha at the bulk temperature, in S also at the contact
-    temperature. Where the contact is hotter than any oil (510 degC) there is no film.
+    cycle times the square root of the load factor; viscosity eta and its pressure coefficient alpha at the bulk
+    temperature, in S also at the contact temperature. Where the contact is hotter than any oil (510 degC) there is no
+    film.
 
     References:
         D. Dowson, G. R. Higginson, Elasto-hydrodynamic Lubrication, 1966; ISO/TS 6336-22 (ISO/TR 15144-1), method A.
@@ -241,7 +261,7 @@ def film_thickness(cycle: MeshCycle, lubricant: Lubricant) -> Load:
     viscosity, coefficient = lubricant.viscosity(bulk), lubricant.pressure_viscosity(bulk)
     material = safe_power(coefficient * modulus, 0.6)
     motion = safe_power(viscosity * rolling / (2e-3 * modulus * radius), 0.7)
-    pressure = 1e6 * cycle.contact_pressure
+    pressure = 1e6 * cycle.contact_pressure * jnp.sqrt(lubricant.load_factor)
     apart = pressure <= 0
     load = (2 * jnp.pi * (jnp.where(apart, 1.0, pressure) / modulus) ** 2) ** -0.13
     thinning = lubricant.pressure_viscosity(hot) * lubricant.viscosity(hot) / (coefficient * viscosity)

@@ -50,6 +50,9 @@ class Strength(AbstractSettings):
         bending_cycles: load cycles for which `bending` is permissible, likewise.
         wheel_pitting_exponent, wheel_pitting_cycles: those of the wheel; None for those of the pinion.
         wheel_bending_exponent, wheel_bending_cycles: those of the wheel; None for those of the pinion.
+        load_factor: product of the load factors, K_A K_gamma K_v K_Halpha as far as the contact analysis does not know
+            them, by which safeties and damages take the load: stresses of the root times the factor, pressures times
+            its square root.
     """
 
     table = "strength"
@@ -66,6 +69,7 @@ class Strength(AbstractSettings):
     wheel_pitting_cycles: Scalar | None = number("", low=0.0, open_low=True, optional=True, default=None)
     wheel_bending_exponent: Scalar | None = number("", low=1.0, high=100.0, optional=True, default=None)
     wheel_bending_cycles: Scalar | None = number("", low=0.0, open_low=True, optional=True, default=None)
+    load_factor: Scalar = number("", low=0.0, high=100.0, open_low=True, default=1.0)
 
     def check_together(self) -> None:
         for name in ("pitting", "bending"):
@@ -84,7 +88,13 @@ def safety_factor(borne: Real, reached: Real) -> Real:
 
 def _safety(owner: str, strength: Strength, name: Mode, stress: Any) -> tuple[Real, Real]:
     pinion, wheel = strengths_of(owner, strength, name)
-    return safety_factor(pinion, stress.pinion), safety_factor(wheel, stress.wheel)
+    factor = _stress_factor(strength, name)
+    return safety_factor(pinion, factor * stress.pinion), safety_factor(wheel, factor * stress.wheel)
+
+
+def _stress_factor(strength: Strength, name: Mode) -> Scalar:
+    """Ratio of a stress with the load factor to that without: a pressure grows with the square root of the load."""
+    return strength.load_factor if name == "bending" else jnp.sqrt(strength.load_factor)
 
 
 @over_batch
@@ -112,7 +122,7 @@ def local_root_safety(cycle: MeshCycle, strength: Strength) -> tuple[Load, Load]
 def pressure_safety(cycle: MeshCycle, strength: Strength) -> Load:
     """p_lim / p at every contact, on the flanks and at the tip edges."""
     limit = given_strength("pressure_safety", strength, "pressure")
-    return safety_factor(limit, cycle.contact_pressure + cycle.corner_pressure)
+    return safety_factor(limit, jnp.sqrt(strength.load_factor) * (cycle.contact_pressure + cycle.corner_pressure))
 
 
 @over_batch
@@ -197,8 +207,9 @@ def damage_per_cycle(owner: str, strength: Strength, name: Mode, stresses: tuple
     Raises:
         ValueError: for a strength without that S-N curve.
     """
+    factor = _stress_factor(strength, name)
     curves = zip(*(strengths_of(owner, strength, each) for each in (name, f"{name}_exponent", f"{name}_cycles")))
     pinion, wheel = (
-        (stress / limit) ** exponent / cycles for stress, (limit, exponent, cycles) in zip(stresses, curves)
+        (factor * stress / limit) ** exponent / cycles for stress, (limit, exponent, cycles) in zip(stresses, curves)
     )
     return pinion, wheel

@@ -145,11 +145,12 @@ def free_form(
     def polished(problem, record, point):
         follow(record.linearizer, record, [Search(point)], steps=steps, rtol=_RTOL)
 
-    record, change = refined(record, polished, positions)
+    found = refined(record, polished, positions)
+    record = found.record
     if not constraints:  # which may depend on what both flanks have in common
         flanks = record.point.reshape(2, points)
         record.point = (flanks - flanks.min(axis=1, keepdims=True)).ravel()
-    return optimum_of(record, "free_form", began, change)
+    return optimum_of(record, "free_form", began, found.change)
 
 
 def _roll_lengths(mesh: Mesh, points: int):

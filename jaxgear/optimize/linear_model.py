@@ -37,14 +37,14 @@ class Linearizer:
     """
 
     def __init__(self, problem: Problem, batch: int, positions: int | None = None) -> None:
-        self.problem = problem
-        self._batch, self._positions = batch, positions or problem.mesh.resolution.positions
+        self.problem, self.batch = problem, batch
+        self._positions = positions or problem.mesh.resolution.positions
         meshes = parts(problem.mesh, self._positions) if problem.is_made_of_extremes else []
         self._parts = [problem.on(mesh) for mesh in meshes] if len(meshes) > 1 else [problem]
 
     def on(self, problem: Problem) -> "Linearizer":
         """That of the same problem on another mesh, by the same program if there can be one."""
-        return Linearizer(problem, self._batch, self._positions)
+        return Linearizer(problem, self.batch, self._positions)
 
     def __call__(self, points: np.ndarray) -> list[Linearization]:
         """The linearization at every point."""
@@ -66,7 +66,7 @@ class Linearizer:
         """At every point, the linearizations on each of the meshes."""
         found = []
         for part in self._parts:
-            rows = _linearizations(part, real_points(part, padded(points, self._batch)), np.asarray(len(points)))
+            rows = _linearizations(part, real_points(part, padded(points, self.batch)), np.asarray(len(points)))
             leaves, tree = jax.tree.flatten(rows)
             found.append(([np.asarray(leaf) for leaf in leaves], tree))
         return [

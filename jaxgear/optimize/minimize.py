@@ -3,6 +3,7 @@
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import fields
+from types import MappingProxyType
 
 from ..conditions import Design
 from ..conditions.cases import Loads
@@ -15,6 +16,7 @@ from .population import CMAES, BinaryGenetic, DifferentialEvolution, Factorial, 
 from .problem import make_problem
 from .refine import POSITIONS, refined
 from .result import Optimum
+from .rounding import check_steps
 from .search import AbstractMethod, Record
 from .slp import SLP
 from .verdict import optimum_of
@@ -72,6 +74,7 @@ def minimize(
     starts: int | None = None,
     steps: int | None = None,
     positions: int | None = POSITIONS,
+    rounding: Mapping[str, float] = MappingProxyType({}),
     callback: Callback | None = None,
 ) -> Optimum:
     """Finds the parameters of a modification with the least transmission error, or the best of something else.
@@ -95,6 +98,9 @@ def minimize(
         steps: steps of every start, likewise.
         positions: of the finer mesh on which the search ends and its result is evaluated, at least those of `mesh`. An
             extreme over few positions is fitted to them: the true one lies in between. None to stay on `mesh`.
+        rounding: steps of parameters in which the result is wanted, by name and in the unit of their bounds, such as
+            `{"amount": 0.5}`: the best design found on multiples of them, see `Optimum.rounding`. Parameters without a
+            step, and with 0, keep all digits.
         callback: called as callback(step, steps, best objective) between steps.
 
     Returns:
@@ -108,6 +114,7 @@ def minimize(
     if not (isinstance(objective, str) or callable(objective)):
         raise ValueError("minimize: objective must be one quantity; jaxgear.optimize.pareto finds a front of several")
     began = time.perf_counter()
+    rounded_to = check_steps("minimize", rounding, bounds)
     posed = make_problem(
         design,
         bounds,
@@ -123,5 +130,7 @@ def minimize(
     record = Record(posed, callback)
     method.search(posed, record)
     record.check()
-    record, change = refined(record, method.polish, positions)
-    return optimum_of(record, method.name, began, change)
+    found = refined(record, method.polish, positions, rounded_to)
+    unrounded = found.unrounded if rounded_to else None
+    taken = {} if found.record is found.unrounded else rounded_to
+    return optimum_of(found.record, method.name, began, found.change, unrounded=unrounded, steps=taken)

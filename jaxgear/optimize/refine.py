@@ -1,8 +1,9 @@
 """The end of a search, on a mesh so fine that its result does not change any more and keeps the limits."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import TypeVar
+from types import MappingProxyType
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
@@ -10,7 +11,7 @@ from ..contact import Mesh, prepare
 from ..numerics import whole
 from .goal import FEASIBLE, counted
 from .linear_model import Linearizer, LinearModel, NoObjective
-from .problem import Problem
+from .rounding import Polish, rounded
 from .search import Record, points_nearby, scores, start_points
 from .slp import Ledger, Search, follow
 
@@ -24,11 +25,27 @@ _NEAR, _FAR, _REACH, _STEPS = 4, 4, 0.1, 30
 _ENOUGH = 0.1  # of the tolerance of a limit: what a step of theirs has to gain
 
 Found = TypeVar("Found")
-Polish = Callable[[Problem, Record, np.ndarray], None]
 
 
-def refined(record: Record, polish: Polish, positions: int | None) -> tuple[Record, float]:
-    """Goes on from the best design of a record on a finer mesh, see `on_finer_meshes`.
+class Refined(NamedTuple):
+    """The end of a search.
+
+    Attributes:
+        record: of the finest mesh, with all that was spent; of the design on the steps.
+        change: of the objective at twice the positions; NaN where it was not evaluated.
+        unrounded: of the finest mesh before the variables were rounded; the same as `record` without steps, and where
+            no design on them keeps the limits that it keeps.
+    """
+
+    record: Record
+    change: float
+    unrounded: Record
+
+
+def refined(
+    record: Record, polish: Polish, positions: int | None, steps: Mapping[str, float] = MappingProxyType({})
+) -> Refined:
+    """Goes on from the best design of a record on a finer mesh, see `on_finer_meshes`, and ends on the steps.
 
     Where none of the designs met keeps all limits, one that does is sought whatever its objective is.
 
@@ -36,28 +53,35 @@ def refined(record: Record, polish: Polish, positions: int | None) -> tuple[Reco
         record: of the search so far.
         polish: searches on, from a point.
         positions: of the first finer mesh; None to stay.
-
-    Returns:
-        the record of the finest mesh, with all that was spent, and by how much its objective changes at twice the
-        positions.
+        steps: of the variables to be rounded, see `rounded`.
     """
     if positions is None:
         _kept_to_limits(record, polish)
-        return record, float("nan")
+        return Refined(_on_steps(record, steps, polish), float("nan"), record)
     problem = record.problem
 
-    def end_on(mesh: Mesh) -> tuple[tuple[Record, float], bool]:
+    def end_on(mesh: Mesh) -> tuple[Refined, bool]:
         nonlocal record
         found = record.on(problem.on(mesh))
         polish(found.problem, found, record.point)
         found.check()
         _kept_to_limits(found, polish)
-        record, now = found, np.asarray([[found.value]])
-        values, violations = at_more_positions(found, found.point[None])
-        change = problem.objectives[0].sign * float(values[0, 0] - found.value)
-        return (found, change), fine_enough(now, np.asarray([found.violation]), values, violations)
+        record, ends = found, _on_steps(found, steps, polish)
+        values, violations = at_more_positions(ends, ends.point[None])
+        found.evaluations = ends.evaluations
+        change = problem.objectives[0].sign * float(values[0, 0] - ends.value)
+        now = np.asarray([[ends.value]]), np.asarray([ends.violation])
+        return Refined(ends, change, found), fine_enough(*now, values, violations)
 
     return on_finer_meshes("minimize", problem.mesh, positions, end_on)
+
+
+def _on_steps(record: Record, steps: Mapping[str, float], polish: Polish) -> Record:
+    """The best design on the steps, or that of the record without steps and where rounding breaks a limit."""
+    if not steps:
+        return record
+    found = rounded(record, steps, polish)
+    return record if counted(found.violation) > counted(record.violation) else found
 
 
 def on_finer_meshes(owner: str, mesh: Mesh, positions: int, end_on: Callable[[Mesh], tuple[Found, bool]]) -> Found:

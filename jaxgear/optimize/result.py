@@ -72,6 +72,25 @@ class Limit(Checked):
         return {"value": self.value, "low": self.low, "high": self.high, "unit": self.unit, "met": self.kept}
 
 
+class Rounding(Checked):
+    """How the parameters of an optimum were rounded, and what they were before.
+
+    Attributes:
+        steps: of the rounded parameters, in the units of their bounds; none where no design on the steps was found that
+            keeps the limits.
+        parameters: value of every free parameter before.
+        objective: before, in its unit, on the same mesh.
+    """
+
+    steps: dict[str, float]
+    parameters: dict[str, float]
+    objective: float
+
+    def summary(self) -> dict[str, Any]:
+        """Plain numbers."""
+        return {"steps": self.steps, "parameters_before": self.parameters, "objective_before": self.objective}
+
+
 class Optimum(eqx.Module):
     """Result of every method of optimization.
 
@@ -91,7 +110,7 @@ class Optimum(eqx.Module):
         optimality: first-order optimality: largest predicted decrease of the objective within bounds and constraints,
             per full range of a parameter; 0 at an optimum. It comes from the linearized problem (`linear_model`) and
             counts the kinks of extremes, where the plain gradient does not vanish. NaN where there are no parameters,
-            and where the slopes are not finite.
+            and where the slopes are not finite. With `rounding` that of the design before.
         active_bounds: which parameters ended at their "lower" or "upper" bound.
         constraints: the limits, by name, each with its value and whether it is kept.
         violation: largest relative excess over a constraint; 0 where all are kept.
@@ -105,6 +124,7 @@ class Optimum(eqx.Module):
             methods.
         problem: the optimization problem, on `mesh`, by which `judged` evaluates other designs; None of the
             transmission-error iteration.
+        rounding: steps of the parameters, and what they were before; None where they keep all digits.
     """
 
     method: str = eqx.field(static=True)
@@ -130,6 +150,7 @@ class Optimum(eqx.Module):
     iterations: tuple[Iterate, ...] = ()
     history_positions: np.ndarray | None = None
     problem: Problem | None = None
+    rounding: Rounding | None = None
 
     @property
     def feasible(self) -> bool:
@@ -143,6 +164,8 @@ class Optimum(eqx.Module):
 
     def _rows(self):
         yield self.objective_name, f"{self.objective:.4g} {self.objective_unit}".rstrip()
+        if self.rounding is not None and self.rounding.steps:
+            yield "before rounding", f"{self.rounding.objective:.4g} {self.objective_unit}".rstrip()
         if self.objective_name != "ppte":
             yield "PPTE", f"{self.ppte:.4g} um"
         yield "contact analyses", f"{self.evaluations} in {self.seconds:.2f} s"
@@ -177,6 +200,7 @@ class Optimum(eqx.Module):
             "feasible": self.feasible,
             "constraints": {name: limit.summary() for name, limit in self.constraints.items()},
             "violation": self.violation,
+            **({} if self.rounding is None else {"rounding": self.rounding.summary()}),
             "evaluations": self.evaluations,
             "history": {"evaluations": self.history_evaluations, "objective": self.history},
         }

@@ -1,25 +1,28 @@
 """What is said about the best design of a search, and a second opinion by finite elements."""
 
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from types import MappingProxyType
 
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Array
 
 from ..compliance import TabulatedCompliance, finite_element_compliance
-from ..conditions import in_words, solve_case, solved
+from ..conditions import in_words, solve_case, solved, two_modifications
 from ..contact import Mesh, MeshCycle, OperatingPoint, prepare
 from ..contact.mesh import begin_mesh
 from ..metrics import Analysis
 from ..microgeometry import AbstractModification
-from ..numerics import program
+from ..numerics import program, real
 from .goal import FEASIBLE, Constraint
 from .linear_model import Linearizer, LinearModel
 from .problem import Problem
-from .result import PENALIZED, Limit, Optimum
+from .result import PENALIZED, Limit, Optimum, Rounding
+from .rounding import on_step
 from .search import Record
 
 _AT_BOUND = 1e-6  # a parameter this close to a bound, relative to its range, is at the bound
@@ -27,7 +30,14 @@ PROBE = 1e-3  # step over which the decrease that is left is measured, relative 
 
 
 def optimum_of(
-    record: Record, method: str, began: float, grid_change: float = float("nan"), *, left: float | None = None
+    record: Record,
+    method: str,
+    began: float,
+    grid_change: float = float("nan"),
+    *,
+    left: float | None = None,
+    unrounded: Record | None = None,
+    steps: Mapping[str, float] = MappingProxyType({}),
 ) -> Optimum:
     """The best design of a record with all that is said about it.
 
@@ -37,15 +47,23 @@ def optimum_of(
         began: when the search began, as `time.perf_counter` tells.
         grid_change: of the objective at twice the positions.
         left: decrease that is left, where it is known.
+        unrounded: record of the search before its variables were rounded; None where they were not to be.
+        steps: to which they were rounded.
     """
     problem = record.problem
     x = np.asarray(record.point, np.dtype(problem.low.dtype))
-    parameters, (pinion, wheel) = problem.parameters(x), problem.modifications(x)
+    parameters = _on_steps(problem.parameters(x), steps)
+    pinion, wheel = two_modifications(problem.design(parameters))
     heaviest = np.asarray(problem.cases.torque)[np.asarray(problem.cases.weight).argmax()]
     cycle = solve_case(problem.mesh, heaviest, pinion, wheel)
-    left = _optimality(record) if left is None else left  # before the analyses are counted
+    left = _optimality(unrounded or record) if left is None else left  # before the analyses are counted
     several = len(problem.objectives) > 1
     sign = 1 if several else problem.objectives[0].sign
+    rounding = None
+    if unrounded is not None:
+        record.evaluations = unrounded.evaluations
+        exact = {name: float(value) for name, value in problem.parameters(unrounded.point).items()}
+        rounding = Rounding(dict(steps), exact, sign * unrounded.value)
     return Optimum(
         method=method,
         objective_name=objective_name(problem),
@@ -69,7 +87,14 @@ def optimum_of(
         history_positions=np.asarray([positions for _, _, positions in record.history], int),
         seconds=time.perf_counter() - began,
         problem=problem,
+        rounding=rounding,
     )
+
+
+def _on_steps(parameters: dict[str, Array], steps: Mapping[str, float]) -> dict[str, Array]:
+    """Parameters of which those with a step are the decimal number nearest to its multiple."""
+    rounded = {name: on_step(float(parameters[name]), step) for name, step in steps.items()}
+    return parameters | {name: real(np.asarray(value, parameters[name].dtype)) for name, value in rounded.items()}
 
 
 def _optimality(record: Record) -> float:

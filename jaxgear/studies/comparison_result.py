@@ -78,7 +78,11 @@ class ComparisonResult(AbstractStudyResult):
         if self.optimum is not None:
             found = self.optimum, self.front, self.projection, self.evaluations
             yield from optimum_report.first_screen(
-                self.design, *found, searched_at=self.searched_at, trust=self._trust()
+                self.design,
+                *found,
+                searched_at=self.searched_at,
+                unusual=self.unusual[side_by_side.main_name(self.evaluations)],
+                trust=self._trust(),
             )
 
     def _trust(self) -> Iterator[tuple[str, str]]:
@@ -104,6 +108,8 @@ class ComparisonResult(AbstractStudyResult):
 
     def _notes(self) -> Iterator[str]:
         yield from manufactured.lines(self.design, self.evaluations)
+        if self.design.coast:
+            yield "coast flanks: contact runs from pinion tip to pinion root, positions count against the rotation"
         if self.quick:
             yield "quick run, coarse positions and a short search: a preview, do not use for design"
         if self.unverified:

@@ -29,12 +29,13 @@ def summary(
     found: Mapping[str, tuple[Finding, ...]],
 ) -> dict[str, Any]:
     """The designs, with the findings that were `found` of each."""
+    pair = mesh.pair.coast if file.coast else mesh.pair  # of the hands that the file has
     return {
-        "torque_Nm": file.torque,
+        "torque_Nm": file.signed_torque,
         "torque_range_Nm": file.torque_range,
         "speed_rpm": file.speed,
         "friction": file.friction,
-        "gears": {name: _gear(getattr(mesh.pair, name)) | _drawn(drawn) for name, drawn in file.drawn.items()},
+        "gears": {name: _gear(getattr(pair, name)) | _drawn(drawn) for name, drawn in file.drawn.items()},
         "center_distance_mm": gears(file)["geometry"]["pair"]["center_distance_mm"],
         **_misalignment(mesh),
         **manufactured.tolerances(file),

@@ -24,6 +24,7 @@ class DesignAnalysis(AbstractStudy[ComparisonResult]):
     """
 
     name: ClassVar = "analyze"
+    takes_coast: ClassVar = True
     coarse: ClassVar = ""
 
     tolerance: Tolerance | None

@@ -62,9 +62,9 @@ _FACTORS = {
     "wheel_root_stress_MPa": "sigma_F",
 }
 _RATING_NOTE = (
-    "Application factor, dynamic factor and transverse load factor are 1 here, include them in the torque; so are "
-    "Y_B and Y_DT, for solid bodies and contact ratios up to 2. K_Hbeta is that of the contact "
-    "analysis, 1 on one slice."
+    "Application factor, dynamic factor and transverse load factor are 1 here: load_factor of [strength] takes them "
+    "into safeties and damages, that of [lubricant] into friction, flash temperature and film. Y_B and Y_DT are 1, for "
+    "solid bodies and contact ratios up to 2. K_Hbeta is that of the contact analysis, 1 on one slice."
 )
 _TOLERANCE_NOTE = (
     "Slopes and pitch are limits of either sign, form and total deviations are widths of a band, about the flank as "

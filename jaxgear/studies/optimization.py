@@ -28,6 +28,7 @@ class DesignOptimization(AbstractStudy[ComparisonResult]):
     """
 
     name: ClassVar = "optimize"
+    takes_coast: ClassVar = True
     coarse: ClassVar = ""  # the result says it
     needs: ClassVar = ("scipy.optimize",)
 

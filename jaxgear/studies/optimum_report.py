@@ -12,7 +12,7 @@ import numpy as np
 from ..contact import Mesh, Side
 from ..io import DesignFile, describe
 from ..io.results import unit_of
-from ..metrics import Quantity, flank_surface
+from ..metrics import Finding, Quantity, flank_surface
 from ..microgeometry import AbstractModification
 from ..optimize import Front, Optimum, Problem, Projection
 from ..optimize.result import PENALIZED
@@ -230,6 +230,7 @@ def first_screen(
     evaluations: side_by_side.Evaluations,
     *,
     searched_at: int,
+    unusual: Iterable[Finding],
     trust: Iterable[tuple[str, str]],
 ) -> Iterator[Table]:
     """What an engineer looks for first: what to grind, what it gains and whether to trust it.
@@ -241,23 +242,51 @@ def first_screen(
         projection: of it on a curve.
         evaluations: designs by their names, the first of which is unmodified.
         searched_at: positions at which the search began.
+        unusual: findings about the design.
         trust: further rows about the last, such as what is not usual.
     """
     name, best = side_by_side.main_name(evaluations), side_by_side.main(evaluations)
-    rows = [*to_grind(optimum.mesh, best.pinion, best.wheel)]
+    rows = [*_overloads(unusual, optimum), *to_grind(optimum.mesh, best.pinion, best.wheel)]
     if projection is not None:
         rows += to_grind(optimum.mesh, projection.pinion, projection.wheel, f"as {projection.curve}")
     yield Table(("", ""), tuple(rows), f"Modification to grind: {name} of {file.title}")
-    gained = [*gains(evaluations, optimum.problem)]
+    gained = [*gains(evaluations, optimum.problem), *_rounding(file, optimum)]
     if front is not None and optimum.problem is not None:
         gained += front_rows(front, [of.sign for of in optimum.problem.objectives], evaluations)
-    yield Table(("", ""), tuple(gained), f"Gain at {file.torque:g} N m: unmodified -> {name}")
+    yield Table(("", ""), tuple(gained), f"Gain at {file.load_in_words}: unmodified -> {name}")
     judged_by = (
         *_feasibility(optimum),
         *_bounds(file, optimum),
         *zip(chain(("grid",), repeat("")), _positions(optimum, evaluations, searched_at)),
     )
     yield Table(("", ""), (*judged_by, *trust), "Checks of the result")
+
+
+_LIMITED = {"corner pressure": "max_corner_pressure", "flank pressure": "max_flank_pressure"}
+
+
+def _overloads(unusual: Iterable[Finding], optimum: Optimum) -> Iterator[tuple[str, str]]:
+    """Rows about pressures that no flank endures, and how a search keeps below them."""
+    for finding in unusual:
+        name = _LIMITED.get(finding.key)
+        if name is not None and name not in optimum.constraints:
+            limit = f'[[optimize.constraint]] with of = "{name}", high = {finding.usual.high:g}'
+            yield "overload", f"{finding.key} {finding.number} exceeds {finding.usual.high:g} MPa; limit it: {limit}"
+
+
+def _rounding(file: DesignFile, optimum: Optimum) -> Iterator[tuple[str, str]]:
+    """A row about the steps of the variables, and what they cost."""
+    rounding = optimum.rounding
+    if rounding is None:
+        return
+    if not rounding.steps:
+        yield "rounding", "none: no design on the steps was found that keeps all limits, the variables have all digits"
+        return
+    steps = dict.fromkeys(f"{step:g} {file.units[name]}".rstrip() for name, step in rounding.steps.items())
+    kept = [name for name in optimum.parameters if name not in rounding.steps]
+    digits = f"; all digits: {', '.join(kept)}" if kept else ""
+    cost = f"{rounding.objective:.4g} -> {optimum.objective:.4g} {optimum.objective_unit}".rstrip()
+    yield "rounding", f"to steps of {' and '.join(steps)}: {optimum.objective_name} {cost}{digits}"
 
 
 def search_lines(optimum: Optimum, front: Front | None, projection: Projection | None) -> Iterator[str]:

@@ -32,7 +32,7 @@ _TITLE = 9.0  # [pt]
 
 def table(file: DesignFile, evaluations: Evaluations) -> Table:
     """The designs side by side at the design torque."""
-    result = Table(("", *evaluations), title=f"{file.title}, {file.torque:g} N m on the pinion")
+    result = Table(("", *evaluations), title=f"{file.title}, {file.load_in_words} on the pinion")
     first = next(iter(evaluations.values()))
     second = verified(evaluations)
     rows = quantities_of(evaluations)

@@ -81,6 +81,7 @@ class AbstractStudy(abc.ABC, Generic[R]):
         needs: modules that it imports late; a command imports them ahead, beside its first compilation.
         files: names of files that its results may have beside those of the studies of jaxgear.
         takes_shafts: whether the shafts of the file support the gears at every load.
+        takes_coast: whether it knows the coast flanks, which carry a negative torque.
         design: the design file.
         quick: whether the study is a preview on few positions.
     """
@@ -90,6 +91,7 @@ class AbstractStudy(abc.ABC, Generic[R]):
     needs: ClassVar[tuple[str, ...]] = ()
     files: ClassVar[frozenset[str]] = frozenset()
     takes_shafts: ClassVar[bool] = False
+    takes_coast: ClassVar[bool] = False
 
     design: DesignFile
     quick: bool
@@ -118,6 +120,8 @@ class AbstractStudy(abc.ABC, Generic[R]):
             DesignFileError: for what only shows in the calculation.
             ValueError: when a checkpoint cannot be written.
         """
+        if not self.takes_coast:
+            self.design.check_drive(f"jaxgear {self.name}")
         return self.work_out(Checkpoints() if checkpoints is None else checkpoints, Stages(callback))
 
     @abc.abstractmethod
