@@ -3,6 +3,7 @@
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 import pytest
 
 from jaxgear.numerics import programs, quick_jit
@@ -65,3 +66,20 @@ def test_the_compiler_is_asked_what_it_knows(monkeypatch):
 def test_whoever_says_how_to_compile_is_heard(monkeypatch):
     monkeypatch.setenv("XLA_FLAGS", "--xla_backend_optimization_level=2")
     assert programs.quick_options.__wrapped__() is None
+
+
+def test_another_python_number_compiles_nothing_anew():
+    traced = []
+
+    @quick_jit
+    def scaled(x, factor, *, offset=0.0, name="plain"):
+        traced.append(name)
+        return x["depth"] * factor + offset
+
+    found = [float(scaled({"depth": 0.5 + n}, 2.0 * n, offset=n)) for n in range(4)]
+    assert found == [n * (1 + 2 * n) + n for n in range(4)] and len(traced) == 1
+    # of the type that jax.jit gives it: a Python number takes that of the array beside it
+    single = scaled({"depth": jnp.ones(2, jnp.float32)}, 3.0, offset=np.float32(1))
+    assert single.dtype == jnp.float32 and len(traced) == 2
+    scaled({"depth": jnp.zeros(2, jnp.float32)}, 4.0, offset=np.float32(2), name="another")  # static
+    assert traced == ["plain", "plain", "another"]

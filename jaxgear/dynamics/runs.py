@@ -10,7 +10,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool
 
 from ..conditions.join import divided, local_devices, over_devices, padded
-from ..numerics import Numbers, kernel, quick_jit, whole
+from ..numerics import Numbers, kernel, program, whole
 from .oscillator import Oscillator
 from .response import SpeedResponse
 from .speed_sweep import check_single, checked_frequencies, prepared, steps_for, swept
@@ -213,7 +213,7 @@ def _named(found: SpeedResponse, ways: _Ways, axis: int = 0) -> Responses:
     return {name: replace(one, direction=direction) for one, (name, direction) in zip(each, ways, strict=True)}
 
 
-@quick_jit
+@program
 def _along(found: SpeedResponse, axis: int) -> list[SpeedResponse]:
     """What lies side by side along an axis, one by one."""
     leaves, structure = jax.tree.flatten(found)

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from ...numerics import Given, check, concrete, number, quick_jit, real
+from ...numerics import Given, check, concrete, number, program, quick_jit, real
 from ..force import AbstractMeshForce
 
 Scalar = Float[Array, ""]
@@ -137,7 +137,7 @@ def warn_of_false_well(clearance: PolynomialClearance, load: Given) -> bool:
     return True
 
 
-@quick_jit
+@program
 def _fitted(order: int, most: Scalar) -> Float[Array, " terms"]:
     """Coefficients of least squares: Legendre's odd polynomials of x / range are orthogonal over the range."""
     node, weight = np.polynomial.legendre.leggauss(_NODES)
