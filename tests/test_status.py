@@ -7,7 +7,7 @@ import pytest
 from catalogue import LINE, gear_pair
 
 import jaxgear as jg
-from jaxgear.contact.status import Status, reason, status_of
+from jaxgear.contact.status import Status, explanation, reason, status_of, tally
 
 
 def test_the_most_basic_cause_counts():
@@ -25,6 +25,14 @@ def test_the_most_basic_cause_counts():
 def test_every_cause_has_a_text_of_its_own():
     texts = [status.text for status in Status]
     assert len(set(texts)) == len(texts) and all("\n" not in text for text in texts)
+
+
+def test_the_commonest_cause_is_told_with_its_remedy():
+    failures = tally(jnp.array([[3, 0, 3], [1, 6, 3]], jnp.int8))
+    assert failures == {Status.MORE_PAIRS_NEEDED: 3, Status.NOT_CONVERGED: 1, Status.GEARS_CANNOT_RUN: 1}
+    said = explanation(failures, 6, "variants", pairs=2)
+    assert said.startswith("3 of 6 variants: tooth pairs beyond those of the mesh") and said.endswith("at least 3")
+    assert all(status.remedy for status in Status if status) and tally(jnp.zeros(3, jnp.int8)) == {}
 
 
 @pytest.mark.slow
@@ -45,9 +53,12 @@ def test_a_batch_has_a_status_of_every_member_and_derivatives_pass_it():
 
 def test_a_cycle_says_why_it_has_not_converged():
     mesh = jg.prepare(gear_pair(), resolution=LINE)
-    text = str(jg.solve(mesh, 1e5))
+    cycle = jg.solve(mesh, 1e5)
+    text = str(cycle)
     assert "NOT CONVERGED (tooth pairs beyond those of the mesh come into contact, more are needed)" in text
     assert "16 positions, converged" not in text
+    batch = jax.tree.map(lambda leaf: jnp.stack([leaf, leaf]), cycle)  # as jax.vmap gives it
+    assert str(batch).startswith("(2,) of MeshCycle, 16 positions, 2 of 2 NOT CONVERGED (tooth pairs beyond")
 
 
 @pytest.mark.parametrize("status", list(Status))

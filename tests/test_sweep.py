@@ -14,6 +14,7 @@ from catalogue import LINE, gear_pair
 from scipy.stats.mstats import hdquantiles
 
 import jaxgear as jg
+from jaxgear.contact.status import Status
 from jaxgear.sweeps.columns import FLAG, NUMBER, Column, described
 from jaxgear.sweeps.store import Manifest, Store, load_manifest
 from jaxgear.sweeps.table import front, smallest
@@ -98,7 +99,7 @@ def assert_same(first, second):
 
 
 def assert_results_of_solve(mesh, table, names, rows):
-    assert table.names == ("variant", *BOUNDS, *(quantities[name].key for name in names), "converged")
+    assert table.names == ("variant", *BOUNDS, *(quantities[name].key for name in names), "converged", "status")
     columns = content(table)
     np.testing.assert_array_equal(columns["variant"], np.arange(40))
     assert columns["converged"].all() and len(table) == 40
@@ -164,6 +165,8 @@ def test_impossible_variants_are_rows(mesh, table):
     np.testing.assert_array_equal(np.isnan(mixed.column("ppte_um")), failed)
     np.testing.assert_array_equal(mixed.column("ppte_um")[~failed], np.repeat(table.column("ppte_um")[:5], 2)[~failed])
     assert mixed.failures() == 3 and len(mixed.best(10)) == 7
+    assert [text for text in mixed.column("status") if text != "converged"] == 3 * ["out_of_validity"]
+    assert mixed.causes() == {Status.OUT_OF_VALIDITY: 3} and "3 of 10 variants: a number is out of" in str(mixed)
 
 
 def test_unsolved_variants_are_rows(mesh, tmp_path):
@@ -181,6 +184,7 @@ def test_unsolved_variants_are_rows(mesh, tmp_path):
     with (tmp_path / "table.csv").open() as file:
         rows = list(csv.DictReader(file))
     assert len(rows) == 40 and rows[0]["ppte_um"] == "" and rows[0]["converged"] == "false"
+    assert rows[0]["status"] == "not_converged" and (table.to_pandas()["status"] == "not_converged").all()
 
 
 def test_the_size_of_the_parts_changes_nothing(mesh, table, folder):
@@ -306,7 +310,7 @@ def test_units_ranges_and_settings_are_in_the_files(folder):
     assert schema.metadata[b"title"] == b"a title" and schema.metadata[b"torques_Nm"] == b"[50.0]"
     assert {b"jaxgear", b"plan", b"weights", b"fingerprint"} <= set(schema.metadata)
     table = jg.open_sweep(folder)
-    for column in table.columns[4:-1]:  # what tables and figures say of a result
+    for column in table.columns[4:-2]:  # what tables and figures say of a result
         of = quantities[column.quantity.name]
         said = "words", "unit", "meaning", "form", "better", "key"
         assert [getattr(column.quantity, name) for name in said] == [getattr(of, name) for name in said]

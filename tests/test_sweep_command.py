@@ -23,6 +23,7 @@ import jaxgear as jg
 from jaxgear.cli import devices, progress, sweep_report
 from jaxgear.cli import sweep as sweep_command
 from jaxgear.cli.sweep_report import said_of_best
+from jaxgear.contact.status import Status
 from jaxgear.io import load_design, read_variants, sweep_request
 from jaxgear.metrics.findings import LIMITS
 from jaxgear.studies import evaluation
@@ -99,7 +100,7 @@ def test_the_report_shows_the_best_variants(folder):
 def test_the_table_is_that_of_the_library(folder):
     folder, _ = folder
     table = jg.open_sweep(folder / "out" / "table")
-    assert table.names == ("variant", "height", "ppte_um", "effective_contact_ratio", "converged")
+    assert table.names == ("variant", "height", "ppte_um", "effective_contact_ratio", "converged", "status")
     assert table.units["height"] == "um" and len(table) == 60 and table.title == "a [small] pair"
     np.testing.assert_array_equal(
         table.column("height"), jg.LatinHypercube({"height": (0.0, 20.0)}, 60, seed=0).rows(0, 60)[:, 0]
@@ -179,14 +180,16 @@ def test_failed_variants_are_loud(folder, tmp_path, monkeypatch):
     evaluated = evaluate._evaluate_few
 
     def failed(*given):
-        values, converged = evaluated(*given)
-        return values, np.zeros_like(converged)
+        values, status = evaluated(*given)
+        return values, np.full_like(status, Status.MORE_PAIRS_NEEDED)
 
     monkeypatch.setattr(evaluate, "_evaluate_few", failed)
     (tmp_path / "gear.toml").write_text(SWEEP)
     result = sweep(tmp_path / "gear.toml", "-o", tmp_path / "out")
     assert result.code == 1 and "60 variants failed" in result.err
-    assert len(jg.open_sweep(tmp_path / "out" / "table")) == 60
+    said = " ".join(result.err.split())
+    assert "60 of 60 variants: tooth pairs" in said and "leave pairs of the resolution open, or raise it to" in said
+    assert list(jg.open_sweep(tmp_path / "out" / "table").column("status")) == 60 * ["more_pairs_needed"]
 
 
 def test_a_slow_sweep_tells_how_far_it_is_before_the_next_tenth(tmp_path, monkeypatch, capsys):

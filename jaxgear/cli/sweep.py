@@ -71,7 +71,7 @@ def run_sweep(
         closer = evaluate_best(target, design, chosen, size, quick=quick, figures=figures)
         sweep_report.write(target, asked, design, table, chosen, closer, files, size=size, quick=quick, grid=grid)
     interrupt.note(f"all results are in {target}{os.sep}")
-    fine = _show(table, chosen, target, meter, quick=quick, lines=[*grid, *findings])
+    fine = _show(table, chosen, target, meter, quick=quick, lines=[*grid, *findings], pairs=size.chosen_pairs)
     if design.left_out:
         report.warn(design.left_out)
     return fine
@@ -86,7 +86,7 @@ def _check(target: Path) -> None:
 
 
 def _show(
-    table: SweepTable, chosen: SweepTable, target: Path, meter: Meter, *, quick: bool, lines: Sequence[str]
+    table: SweepTable, chosen: SweepTable, target: Path, meter: Meter, *, quick: bool, lines: Sequence[str], pairs: int
 ) -> bool:
     out = report.console()
     out.print(_side_by_side(chosen, (out.width - _LABEL_WIDTH) // _CELL_WIDTH))
@@ -98,7 +98,7 @@ def _show(
     report.say(f"{len(table):,} variants{rate}, {meter.elapsed:.1f} s")
     failures = table.failures()
     if failures:
-        report.warn(f"{failures:,} variants failed (column converged)")
+        report.warn(f"{failures:,} variants failed (columns converged and status); {table.why(pairs)}")
     return failures == 0
 
 

@@ -213,7 +213,10 @@ def write(
         *grid,
         *chosen.lines,
     ]
-    warnings = [*chosen.failures, *([f"{failed} variants failed and have no results"] if failed else [])]
+    warnings = [
+        *chosen.failures,
+        *([f"{failed} variants failed and have no results; {table.why(size.chosen_pairs)}"] if failed else []),
+    ]
     pages = [_side_by_side(best), *(_page(table, best, place, chosen) for place in range(min(CHOSEN, len(best))))]
     data: dict[str, Any] = {
         "torque_Nm": design.signed_torque,

@@ -161,7 +161,9 @@ class MeshCycle(WithStatus, eqx.Module):
 
     def __str__(self) -> str:
         if self.batch_ndim:
-            return f"{self.transmission_error.shape[:-1]} of MeshCycle, {self.phase.shape[0]} positions"
+            fine = np.asarray(self.converged).all(axis=-1)
+            failed = f", {np.sum(~fine)} of {fine.size} NOT CONVERGED ({reason(self.status)})" if not fine.all() else ""
+            return f"{self.transmission_error.shape[:-1]} of MeshCycle, {self.phase.shape[0]} positions{failed}"
         error, pressure = np.asarray(self.transmission_error), np.asarray(self.contact_pressure)
         corner = np.asarray(self.corner_pressure)
         state = "converged" if np.all(self.converged) else f"NOT CONVERGED ({reason(self.status)})"

@@ -8,9 +8,10 @@ from typing import Any, NamedTuple
 import jax.numpy as jnp
 import numpy as np
 
-from ..conditions import Design, solve_case, solved
+from ..conditions import Design, cycle_status, solve_case, solved
 from ..contact import Mesh, MeshCycle
 from ..contact.mesh import later, parts
+from ..contact.status import Status
 from ..metrics import max_relief as largest_relief
 from ..metrics import removed_at
 from ..microgeometry import AbstractModification, NoModification, TabulatedProfile
@@ -209,7 +210,8 @@ def _ended(iterates: list[Iterate], rtol: float) -> bool:
 def _solve(mesh: Mesh, torque, pinion: AbstractModification, wheel: AbstractModification) -> MeshCycle:
     cycle = solve_case(mesh, torque, pinion, wheel)
     if not solved(cycle):
-        raise RuntimeError("iterate_transmission_error: a contact solution did not converge")
+        status = Status(int(cycle_status(cycle)))
+        raise RuntimeError(f"iterate_transmission_error: a contact solution failed: {status.text}: {status.remedy}")
     return cycle
 
 

@@ -18,12 +18,14 @@ from ..conditions import (
     Variants,
     check_used,
     conditions,
+    cycle_status,
     solve_case,
     solved,
     two_modifications,
 )
 from ..conditions.cases import Loads
 from ..contact import Mesh, removed_material, solve_removed
+from ..contact.status import Status, Statuses, status_of
 from ..metrics import AbstractSettings, Analysis, Quantity, share_settings
 from ..microgeometry import AbstractModification
 from ..numerics import AbstractMeasure, Mean, changed, maximum, real
@@ -148,6 +150,19 @@ class Problem(eqx.Module):
         """
         found = self.cases.each(lambda *case: self._judged(self._analysis((pinion, wheel), *case)))
         return self._scored(found, jnp.zeros((0,), self.low.dtype))
+
+    def status(self, x: Vector) -> Statuses:
+        """Number of `Status` of a point of the unit box over all cases.
+
+        `OUT_OF_VALIDITY` stands where the contact has converged and an objective or a limit is not finite.
+        """
+
+        def of_case(analysis: Analysis):
+            values, excess, fine = self._judged(analysis)
+            infinite = ~jnp.isfinite(jnp.sum(values)) | ~jnp.isfinite(jnp.sum(excess))
+            return status_of({Status.OUT_OF_VALIDITY: fine & infinite}, cycle_status(analysis.cycle))
+
+        return jnp.max(self.over_cases(x, of_case))
 
     def _judged(self, analysis: Analysis):
         values = jnp.stack([of.sign * of(analysis) for of in self.objectives])

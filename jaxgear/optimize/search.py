@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ..conditions.join import padded, side_by_side
+from ..contact.status import explanation, tally
 from ..numerics import Callback, Given, halton, kernel
 from .goal import counted
 from .linear_model import Linearizer, LinearModel
@@ -39,9 +40,14 @@ class Record:
         return other
 
     def check(self) -> None:
-        """Raises a `RuntimeError` when nothing was found."""
-        if not np.isfinite(self.value):
-            raise RuntimeError("no design that the search evaluated within the bounds has a converged contact solution")
+        """Raises a `RuntimeError` with the commonest reason when nothing was found."""
+        if np.isfinite(self.value):
+            return
+        status = statuses(self.problem, start_points(self.problem, _ASKED))
+        failures, pairs = tally(status), self.problem.mesh.resolution.pairs
+        why = explanation(failures, len(status), "designs tried", pairs) if failures else ""
+        problem = "no design that the search evaluated within the bounds has a converged contact solution"
+        raise RuntimeError("; ".join(filter(None, (problem, why))))
 
     def spend(self, designs: int, *, analyses: int = 1) -> None:
         """Counts contact analyses: of so many designs in every case, each worth so many."""
@@ -122,6 +128,7 @@ def points_nearby(point: np.ndarray, count: int, *, reach: float, seed: int) -> 
     return corner + 2 * reach * halton(len(point), count, seed)
 
 
+_ASKED = 16  # designs by which the reason of a failed search is told
 _INFEASIBLE = 1e6  # rank of a design that passes a limit, above any objective
 
 
@@ -135,6 +142,18 @@ def scores(problem: Problem, points: np.ndarray | Array) -> Score:
 @kernel
 def _scores(problem: Problem, points, batch: int) -> Score:
     return jax.lax.map(problem.score, points, batch_size=batch)
+
+
+def statuses(problem: Problem, points: np.ndarray | Array) -> np.ndarray:
+    """Numbers of `Status` of points of the unit box over all cases, shape (points,)."""
+    count = len(points)
+    batch = min(side_by_side(problem.mesh, problem.cases.count), count)
+    return np.asarray(_statuses(problem, real_points(problem, padded(points, batch)), batch))[:count]
+
+
+@kernel
+def _statuses(problem: Problem, points, batch: int):
+    return jax.lax.map(problem.status, points, batch_size=batch)
 
 
 def fitness(score: Score) -> Float[Array, " designs"] | Float[Array, ""]:

@@ -68,6 +68,8 @@ def _sheet(sheet, table: SweepTable, bold) -> None:
 def _cell(sheet, row: int, place: int, value: Any) -> None:
     if isinstance(value, bool):
         sheet.write_boolean(row, place, value)
+    elif isinstance(value, str):
+        sheet.write_string(row, place, value)
     elif value is not None and np.isfinite(value):
         sheet.write_number(row, place, value)
 

@@ -30,10 +30,10 @@ def from_text(heading: str) -> str:
     return plain if plain.startswith(_FORMULA) else heading
 
 
-VARIANT, CONVERGED = "variant", "converged"
+VARIANT, CONVERGED, STATUS = "variant", "converged", "status"
 
 
-Kind = Literal["number", "parameter", "result", "flag"]
+Kind = Literal["number", "parameter", "result", "flag", "status"]
 
 
 def described(
@@ -130,7 +130,10 @@ class Column:
         return f"{torque}{speed}" + (f"_{self.statistic}" if self.statistic else "")
 
 
-NUMBER, FLAG = Column(described(VARIANT), "number"), Column(described(CONVERGED), "flag")  # first and last of a table
+# first of a table, and its last two
+NUMBER, FLAG, CAUSE = (
+    Column(described(name), kind) for name, kind in ((VARIANT, "number"), (CONVERGED, "flag"), (STATUS, "status"))
+)
 
 
 def axis_label(of: Quantity | Column) -> str:
@@ -150,7 +153,7 @@ def parameter_columns(plan: AbstractPlan, units: Mapping[str, str], taken: Seque
         ValueError: when a parameter has the name of another column.
     """
     for name in plan.names:
-        if name in taken or name in (VARIANT, CONVERGED):
+        if name in taken or name in (VARIANT, CONVERGED, STATUS):
             raise ValueError(f'sweep: parameter "{name}" has the name of another column of the table')
     limits = zip(plan.names, plan.low, plan.high)
     return [Column(described(name, units.get(name, "")), "parameter", low=low, high=high) for name, low, high in limits]

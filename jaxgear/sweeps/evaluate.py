@@ -10,11 +10,12 @@ import jax.numpy as jnp
 import numpy as np
 from jax.sharding import Mesh as DeviceMesh
 
-from ..conditions import Variants, joined, solve_case, solved
+from ..conditions import Variants, cycle_status, joined, solve_case
 from ..conditions.join import divided, everywhere, local_devices, over_devices, padded, side_by_side
+from ..contact.status import Status, status_of
 from ..metrics import Analysis, Quantity, share_settings
 from ..numerics import AbstractMeasure, kernel, program
-from .columns import CONVERGED, result_columns
+from .columns import CONVERGED, STATUS, result_columns
 
 # A loop of one step is unrolled by the compiler and rounds differently: with two or more, the rows do not depend on how
 # many devices share them.
@@ -82,19 +83,22 @@ class Evaluator:
         """Starts the evaluation of at most `capacity` rows; the devices go on while the host does something else.
 
         Returns:
-            what waits for the result columns and the flag; the numbers of failed variants are NaN.
+            what waits for the result columns, the flag and the numbers of `Status`; the results of failed variants are
+            NaN.
         """
         placed = divided(padded(rows.astype(self._dtype), self.capacity), self._devices)
-        values, converged = self._evaluate(self._task, placed, self._data)
+        values, status = self._evaluate(self._task, placed, self._data)
 
         def finished() -> dict[str, np.ndarray]:
             count = len(rows)
-            fine = np.asarray(converged)[:count] & np.isfinite(rows).all(axis=1)
+            given = np.where(np.isfinite(rows).all(axis=1), Status.CONVERGED, Status.OUT_OF_VALIDITY)
+            causes = np.maximum(np.asarray(status)[:count], given.astype(np.int8))
+            fine = causes == Status.CONVERGED
             columns = {}
             for column, of_column in zip(self.columns, values):
                 numbers = np.asarray(of_column)[:count]
                 columns[column.name] = numbers if fine.all() else np.where(fine, numbers, np.nan)
-            return {**columns, CONVERGED: fine}
+            return {**columns, CONVERGED: fine, STATUS: causes}
 
         return finished
 
@@ -110,7 +114,7 @@ def _evaluate_few(task: _Task, rows, data):
 
 
 def _numbers(task: _Task, data, values):
-    """Numbers of one variant in the order of the result columns, and whether all of it converged."""
+    """Numbers of one variant in the order of the result columns, and its status over all cases."""
     variants, measures, settings = eqx.combine(data, task.rest)
     variant = variants(values)
 
@@ -118,13 +122,14 @@ def _numbers(task: _Task, data, values):
         cycle = solve_case(variant.mesh, operating_point, variant.pinion, variant.wheel, deviation)
         analysis = Analysis(cycle, variant.mesh, settings)
         numbers = jnp.stack([of(analysis) for of in task.results])
-        return numbers, solved(cycle) & jnp.all(jnp.isfinite(numbers))
+        infinite = ~jnp.all(jnp.isfinite(numbers))
+        return numbers, status_of({Status.NOT_CONVERGED: infinite}, cycle_status(cycle))
 
-    numbers, fine = variant.cases.each(of_case)
+    numbers, status = variant.cases.each(of_case)
     flat = []
     for of, of_cases in zip(task.results, numbers.T):
         flat += _joined(of_cases, variant.cases, measures, of.better)
-    return flat, jnp.all(fine) & (variant.status == 0)
+    return flat, jnp.maximum(jnp.max(status), variant.status)
 
 
 def _joined(values, cases, measures, better):

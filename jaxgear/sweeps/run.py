@@ -24,7 +24,7 @@ from ..metrics import Analysis, Quantity, share_settings
 from ..numerics import AbstractMeasure, Callback, Mean, Quantile, Worst, whole
 from ..tolerance import Tolerance
 from ..vocabulary import quantities, quantity_of
-from .columns import FLAG, NUMBER, Column, parameter_columns
+from .columns import CAUSE, FLAG, NUMBER, Column, parameter_columns
 from .evaluate import FEW, LEAST_STEPS, Evaluator
 from .plan import AbstractPlan
 from .store import MANIFEST, Manifest, Store, load_manifest
@@ -96,7 +96,8 @@ def sweep(
 
     Returns:
         the table. A variant whose modification, gear pair or load is impossible or whose contact solution failed is a
-        row with `converged` False and results NaN.
+        row with `converged` False and results NaN; its column `status` holds the reason, the name of a
+        `contact.Status` in small letters, such as "more_pairs_needed".
 
     Raises:
         ValueError: for arguments out of range, unknown results, variables on which nothing depends, and an output
@@ -215,6 +216,7 @@ def _columns(plan: AbstractPlan, units: Mapping[str, str], evaluator: Evaluator)
         *parameter_columns(plan, units, names),
         *evaluator.columns,
         FLAG,
+        CAUSE,
     ]
 
 

@@ -18,8 +18,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..contact.status import Status
 from ..numerics.durable import write_durably
-from .columns import CONVERGED, VARIANT, Column, described
+from .columns import CONVERGED, STATUS, VARIANT, Column, described
 
 MANIFEST = "_sweep.parquet"  # Arrow and Spark pass over such names, others find no row in it
 _PART = re.compile(r"part-(\d+)-[0-9a-f]+\.parquet")
@@ -27,6 +28,8 @@ _LEFTOVER = re.compile(r"\.part-(\d+)-.*\.tmp")
 
 # numbers of a column by what its notes call them
 _NUMBERS = {"torque_Nm": "torque", "speed_rpm": "speed", "low": "low", "high": "high"}
+
+_STATUSES = [status.name.lower() for status in Status]  # by their numbers
 
 _log = logging.getLogger("jaxgear")
 
@@ -130,6 +133,9 @@ class Store:
 
         values = {VARIANT: np.arange(*self.span(part)), **columns}
         failed = not values[CONVERGED].all()
+        if STATUS in values:
+            numbers = pyarrow.array(values[STATUS], pyarrow.int8())
+            values[STATUS] = pyarrow.DictionaryArray.from_arrays(numbers, _STATUSES)
         arrays = [pyarrow.array(values[field.name], field.type, from_pandas=failed) for field in self._schema]
         return pyarrow.Table.from_arrays(arrays, schema=self._schema)
 
@@ -178,7 +184,8 @@ def _schema(manifest: Manifest):
     """Arrow schema with the quantities and ranges at the columns, and the sweep itself at the table."""
     import pyarrow
 
-    types = {"number": pyarrow.int64(), "flag": pyarrow.bool_()}
+    words = pyarrow.dictionary(pyarrow.int8(), pyarrow.string())
+    types = {"number": pyarrow.int64(), "flag": pyarrow.bool_(), "status": words}
     fields = []
     for column in manifest.columns:
         of = column.quantity

@@ -1,15 +1,17 @@
 """The table of a sweep, read part by part, its best rows and its Pareto front."""
 
 import math
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from ..contact.status import Status, explanation
 from ..numerics.durable import write_durably
 from ..numerics.pareto import pareto_front
-from .columns import CONVERGED, VARIANT, Column, as_text
+from .columns import CONVERGED, STATUS, VARIANT, Column, as_text
 from .store import Store, load_manifest
 
 Numbered = tuple[np.ndarray, np.ndarray]  # row numbers, and values that are to be small
@@ -60,7 +62,7 @@ class SweepTable:
     """Result of `sweep`: one row per variant, in the order of the plan.
 
     Every method but `column` holds one part of the table at a time, whatever its size. Failed variants stay in the
-    table: their `converged` is False and their results are NaN.
+    table: their `converged` is False, their `status` is the reason, and their results are NaN.
 
     A method takes the name of a column with or without its unit: "ppte_um" or "ppte".
 
@@ -165,6 +167,25 @@ class SweepTable:
         """Number of variants that failed."""
         return sum(int(np.sum(~batch[CONVERGED])) for batch in self.batches([CONVERGED]))
 
+    def causes(self) -> dict[Status, int]:
+        """Number of failed variants by the reason, the commonest first; empty without failures or without reasons."""
+        if STATUS not in self.names:
+            return {}
+        counts: Counter[str] = Counter()
+        for batch in self.batches([STATUS]):
+            counts.update(dict(zip(*np.unique(batch[STATUS].astype(str), return_counts=True))))
+        by_status = {Status[name.upper()]: int(count) for name, count in counts.most_common()}
+        return {status: count for status, count in by_status.items() if status is not Status.CONVERGED}
+
+    def why(self, pairs: int | None = None) -> str:
+        """The commonest reason of failures with its remedy; "" without failures.
+
+        Args:
+            pairs: tooth pairs of the mesh; None where they are not known.
+        """
+        causes = self.causes()
+        return explanation(causes, len(self), "variants", pairs) if causes else ""
+
     def best(self, count: int = 10, *, by: str | None = None) -> "SweepTable":
         """The best variants, best first, without failed ones.
 
@@ -258,7 +279,7 @@ class SweepTable:
 
     def __str__(self) -> str:
         count = len(self)
-        lines = [f"SweepTable {self.title}: {count} variants, {self.failures()} failed"]
+        lines = [f"SweepTable {self.title}: {count} variants, {self.failures()} failed", *filter(None, [self.why()])]
         head = next(self.batches(), {}) if count else {}
         cells = [[c.named, *(_text(value) for value in head[c.name][:_SHOWN])] for c in self.columns if head]
         widths = [max(map(len, column)) for column in cells]
