@@ -10,42 +10,6 @@ from typing import TypeVar
 
 T = TypeVar("T")
 
-# Symbols and names of ISO 21771, ISO 53, ISO 6336 and drawings that a user may write for a key, without underscores and
-# the index of the gear; of keys with one symbol the first that its table knows is meant.
-_SYMBOLS = {
-    "teeth": "z toothnumber numberofteeth",
-    "module": "m mn mt modul",
-    "pressure_angle": "alpha alphan alphap alpha0",
-    "profile_shift": "x xstar",
-    "face_width": "b width",
-    "helix_angle": "beta helix",
-    "addendum": "ha hap",
-    "dedendum": "hf hfp",
-    "root_radius": "rho rhof rhofp",
-    "tip_diameter": "da dk",
-    "tip_form_diameter": "dfa dna",
-    "bore_diameter": "di bore",
-    "tooth_thickness_allowance": "esn esns asne as",
-    "tooth_thickness_tolerance": "tsn ts",
-    "span": "wk w",
-    "teeth_spanned": "k",
-    "over_balls": "mdk mdr mr",
-    "ball_diameter": "dm",
-    "center_distance": "a aw centredistance axisdistance",
-    "backlash": "j jn jbn jt",
-    "torque": "t m",
-    "speed": "n rpm",
-    "friction": "mu",
-    "elastic_modulus": "e youngsmodulus young",
-    "poisson_ratio": "nu",
-    "density": "rho",
-    "amount": "ca caa caf cb calpha cbeta",
-    "length": "lca lcaa lc",
-    "viscosity_40": "nu40",
-    "viscosity_100": "nu100",
-    "temperature": "t theta thetaoil",
-    "roughness": "ra",
-}
 # Control characters, but for tabs and line ends, and those that turn the order of what follows (Unicode TR 36).
 _OBEYED = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]")
 
@@ -138,9 +102,7 @@ def not_known(name: object, names: Iterable[str]) -> str:
 def suggestion(name: object, valid: Iterable[str]) -> str:
     """What to write instead of a name: the nearest valid one, or all of them where none is near."""
     names = sorted(valid)
-    plain = str(name).replace("_", "").lower()
-    meant = [key for key, symbols in _SYMBOLS.items() if key in names and plain.rstrip("12") in symbols.split()]
-    near = meant or difflib.get_close_matches(str(name), names, n=1, cutoff=0.5)
+    near = difflib.get_close_matches(str(name), names, n=1, cutoff=0.5)
     if near:
         return f'did you mean "{near[0]}"?'
     return f"must be one of {', '.join(names)}" if names else "nothing is allowed here"

@@ -10,7 +10,7 @@ from ..manufacture import ToothThickness, drawn_gear
 from ..microgeometry import AbstractModification
 from ..numerics import Number, changed, fields_of
 from ..numerics import real as real_number
-from .errors import DesignFileError, check_known
+from .errors import DesignFileError, suggestion
 from .flanks import FlankFileSection, flank_part
 from .imperial import NORMAL_PITCH, PITCH
 from .table_keys import FileTable, as_field, decode, described, entry, part_of, section_of
@@ -18,6 +18,7 @@ from .template import Free, Part
 from .value_types import QUALITY_CLASS, Kind, either, list_of, not_of_kind, real, table, text
 
 _STEEL = "STEEL"
+_DEFINED = ", or a table [materials.{}] with elastic_modulus, poisson_ratio and density; every steel deflects alike"
 # with any of these a gear says how thick its teeth are
 _THICKNESS = ("span", "over_balls", "tooth_thickness_allowance", "tooth_thickness_tolerance")
 _HAND = "helix_angle"
@@ -148,7 +149,10 @@ def gear_part(section: GearSection, materials: Materials) -> Part:
 def _material(key: str, given: str | Part, materials: Materials) -> Part:
     if isinstance(given, Part):
         return given
-    check_known(key, given, materials)
+    if given not in materials:
+        known = suggestion(given, materials)
+        problem = f'"{given}" is not known, {known}' + _DEFINED.format(given) * (not known.startswith("did"))
+        raise DesignFileError(key, problem)
     return materials[given]
 
 

@@ -20,8 +20,9 @@ import equinox as eqx
 from ..numerics import Number, fields_of
 from ..numerics import real as real_number
 from . import imperial
-from .errors import DesignFileError, check_known, join, not_known, suggestion
+from .errors import DesignFileError, check_known, join, not_known
 from .template import Free, Part
+from .trade_words import unknown_key
 from .value_types import Kind, choice, either, list_of, not_of_kind, real, rows_of, switch, table, text
 
 
@@ -111,7 +112,7 @@ def decode(key: str, data: object, section: type[S]) -> S:
             break
     if unknown is not None:
         known = imperial.names(numbers, like=unknown) or section.keys  # a key without the unit is another number
-        raise DesignFileError(join(key, unknown), f"unknown key, {suggestion(unknown, known)}")
+        raise DesignFileError(join(key, unknown), unknown_key(unknown, known.keys()))
     made = section(key, **values)
     made.written = written
     return made

@@ -12,6 +12,7 @@ from .errors import DesignFileError, check_file, join, obeyed
 _MOST_PARTS = 32
 _PART = r"""(?:[\w-]+|"[^"\n]*"|'[^'\n]*')"""
 _LONG_KEY = re.compile(rf"(?<![\w-]){_PART}(?:[ \t]*\.[ \t]*{_PART}){{{_MOST_PARTS}}}")
+_DECIMAL_COMMA = re.compile(r"=\s*([+-]?\d+),(\d+)\s*(?:[#,}]|$)")
 
 
 def content(path: Path) -> bytes:
@@ -70,5 +71,9 @@ def _check_texts(key: str, value: Any) -> None:
 def _syntax(message: str, text: str) -> str:
     """`message (at line 3, column 7)` -> `line 3, column 7: message`."""
     message = message.replace("at end of document", f"at line {text.count(chr(10)) + 1}")
-    found = re.fullmatch(r"(?P<what>.*) \(at (?P<where>line [^)]*)\)", message, re.DOTALL)
-    return f"{found['where']}: {found['what']}" if found else message
+    found = re.fullmatch(r"(?P<what>.*) \(at (?P<where>line (?P<line>\d+)[^)]*)\)", message, re.DOTALL)
+    if found is None:
+        return message
+    comma = _DECIMAL_COMMA.search(text.split("\n")[int(found["line"]) - 1])
+    remark = f"; if {comma[1]},{comma[2]} has a decimal comma, write {comma[1]}.{comma[2]}" if comma else ""
+    return f"{found['where']}: {found['what']}{remark}"

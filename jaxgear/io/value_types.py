@@ -15,6 +15,7 @@ from ..numerics import Number, fields_of
 from ..tolerance import ToleranceClass
 from .errors import DesignFileError, join, not_known
 from .template import Free
+from .trade_words import remark_on
 
 # Magnitudes that an engineer can mean, by unit: (least of a number that must be positive, most). Beyond them the number
 # or its unit is a slip, and arithmetic on it overflows or loses all digits.
@@ -109,9 +110,9 @@ def real(limits: Number = Number(), *, open: bool = False, plausible: bool = Tru
                 raise DesignFileError(key, not_of_kind("a number", value))
             return Free(value, key, limits)
         if isinstance(value, bool) or not isinstance(value, int if limits.whole else int | float):
-            raise DesignFileError(key, not_of_kind(words, value))
+            raise DesignFileError(key, not_of_kind(words, value) + remark_on(key, value))
         if problem := outside(limits, value, plausible=plausible):
-            raise DesignFileError(key, problem)
+            raise DesignFileError(key, problem + remark_on(key, value))
         return value if limits.whole else float(value)
 
     return Kind(words, read, limits)

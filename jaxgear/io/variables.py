@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from .errors import DesignFileError, suggestion
 from .table_keys import FileTable, entry
 from .template import Free
+from .trade_words import remark_on
 from .value_types import outside, real, text
 
 _BOUND = real(plausible=False)
@@ -49,7 +50,8 @@ def read_variables(
         unit = free.number.unit
         if free.name not in bounds:
             if _QUANTITY.match(free.name):  # "250 Nm", or 2,5
-                raise DesignFileError(free.key, f'"{free.name}" must be a number{f" in {unit}" if unit else ""} alone')
+                problem = f'"{free.name}" must be a number{f" in {unit}" if unit else ""} alone'
+                raise DesignFileError(free.key, problem + remark_on(free.key, free.name))
             known = suggestion(free.name, bounds) if bounds else "there is no [variables] table"
             raise DesignFileError(free.key, f'"{free.name}" is not a variable, {known}')
         other = units.setdefault(free.name, unit)

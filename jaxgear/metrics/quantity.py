@@ -191,6 +191,7 @@ class Quantity(eqx.Module):
 
 
 # of every vocabulary, by the class of the settings and the name
+_NEAR = 0.6  # similarity of a misspelt name
 _OF_SETTINGS: dict[type[AbstractSettings], dict[str, Quantity]] = {}
 
 
@@ -233,7 +234,7 @@ class Vocabulary(Mapping[str, Quantity]):
     def not_known(self, name: object) -> str:
         """That a name is not known, with the nearest known one."""
         known = [*self, *(each.key for each in self.values())]
-        near = difflib.get_close_matches(str(name), known, n=1, cutoff=0.5)
+        near = difflib.get_close_matches(str(name), known, n=1, cutoff=_NEAR)
         hint = f'did you mean "{near[0]}"?' if near else f"must be one of {', '.join(self)}"
         return f'"{name}" is not known, {hint}'
 
