@@ -151,3 +151,52 @@ def test_a_load_has_a_speed(mesh):
     np.testing.assert_allclose(speeds, [[1000.0, 2000.0], [2.5, 2.5]])
     with pytest.raises(ValueError, match="torques must be different, or their speeds"):
         jg.LoadSpectrum([50.0, 50.0], speeds=1000.0)
+
+
+CAPPED = {"amount": (0.0, 5.0)}
+
+
+@pytest.mark.parametrize(
+    ("design", "kind", "said"),
+    [
+        (
+            lambda v: (jg.TipRelief(v["amount"], 3.0) if v["amount"] > 1 else None, None),
+            TypeError,
+            "design: needs the value of a variable (by if, and",
+        ),
+        (
+            lambda v: (jg.TipRelief(v["amuont"], 3.0), None),
+            ValueError,
+            'design: asks for "amuont", which is not a variable, must be one of amount',
+        ),
+    ],
+)
+def test_a_design_that_cannot_be_traced_is_refused_in_one_line(mesh, design, kind, said):
+    for call in (
+        lambda: jg.sweep(design, jg.Sobol(CAPPED, 8, seed=0), mesh, 50.0),
+        lambda: jg.minimize(design, CAPPED, mesh, 50.0),
+    ):
+        with pytest.raises(kind) as error:
+            call()
+        assert str(error.value).startswith(said) and "\n" not in str(error.value)
+
+
+def test_a_key_error_of_the_user_is_left_alone(mesh):
+    """One of a dictionary of his own that has a variable's name."""
+    with pytest.raises(KeyError, match="amount"):
+        jg.sweep(lambda v: ({}["amount"], v["amount"]), jg.Sobol(CAPPED, 8, seed=0), mesh, 50.0)
+
+
+@pytest.mark.parametrize(
+    ("make", "said"),
+    [
+        (lambda: jg.Sobol([("amount", 0.0, 5.0)], 8, seed=0), "Sobol: bounds is a list, must be a dict such as"),
+        (lambda: jg.Sobol({"amount": 5.0}, 8, seed=0), "Sobol: bounds of amount = 5.0 must be two numbers"),
+        (lambda: jg.Sobol({"amount": ("0,5", 6)}, 8, seed=0), "'0,5' must be a number, with a decimal point"),
+        (lambda: jg.sweep(None, [1.0], None, 50.0), "sweep: plan is a list, must be FullFactorial"),
+    ],
+)
+def test_a_plan_of_another_type_is_refused_in_one_line(make, said):
+    with pytest.raises((TypeError, ValueError)) as error:
+        make()
+    assert said in str(error.value) and "\n" not in str(error.value)

@@ -2,7 +2,8 @@
 
 import dataclasses
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from typing import Any, NamedTuple
+from functools import partial
+from typing import Any, NamedTuple, TypeVar
 
 import equinox as eqx
 import jax
@@ -26,6 +27,8 @@ Scalar = Float[Array, ""]
 Parameters = Mapping[str, Scalar]
 Modifications = tuple[AbstractModification | None, AbstractModification | None]
 Design = Callable[[Parameters], Modifications]
+
+Result = TypeVar("Result")
 
 # where the variables of an engine can be used
 _USES = {
@@ -78,16 +81,18 @@ class Variants(Checked):
     def __call__(self, values: Iterable) -> Variant:
         """The variant of some values of the variables, in the order of their names; traceable."""
         parameters = dict(zip(self.names, values))
-        pinion, wheel = two_modifications(self.design(parameters))
+        pinion, wheel = two_modifications(call_with("design", self.design, parameters))
         mesh, cases = self.mesh, self.cases
         made: list[Any] = [pinion, wheel]
         if not isinstance(mesh, Mesh):
-            mesh = mesh(parameters)
+            mesh = call_with("mesh", mesh, parameters)
             made.append(mesh.pair)
         if cases is None:
             conditions = self.conditions
             if self.torque is not None:
-                operating_point = operating_point_of("torque", self.torque(parameters), mesh.slice_width.dtype)
+                operating_point = operating_point_of(
+                    "torque", call_with("torque", self.torque, parameters), mesh.slice_width.dtype
+                )
                 made.append(operating_point)
                 conditions = Conditions(LoadSpectrum.of(operating_point), conditions.deviations)
             cases = conditions.on(mesh)
@@ -98,7 +103,8 @@ class Variants(Checked):
         """The mesh, or one of shapes where every variant has its own."""
         if isinstance(self.mesh, Mesh):
             return self.mesh
-        return eqx.filter_eval_shape(self.mesh, dict(zip(self.names, map(real, values))))
+        parameters = dict(zip(self.names, map(real, values)))
+        return eqx.filter_eval_shape(partial(call_with, "mesh", self.mesh), parameters)
 
     def traced(self, values: Iterable) -> tuple[ClosedJaxpr, list[str]]:
         """Jaxpr of all that the variables make, as an identity of the functions, and the variables that it uses."""
@@ -148,7 +154,7 @@ def variants(
     """
     parameters = {name: real(value) for name, value in zip(names, values)}
     # shapes only: the example may be a variant that cannot be
-    example = mesh if isinstance(mesh, Mesh) else eqx.filter_eval_shape(mesh, parameters)
+    example = mesh if isinstance(mesh, Mesh) else eqx.filter_eval_shape(partial(call_with, "mesh", mesh), parameters)
     if not isinstance(example, Mesh):
         raise ValueError(f"{owner}: mesh gives {type(example).__name__}, must be a Mesh as `prepare` makes it")
     given = 0.0 if callable(torque) else torque
@@ -162,6 +168,33 @@ def variants(
         conditions=judged,
         cases=judged.on(example) if fixed else None,
     )
+
+
+def call_with(name: str, function: Callable[[Parameters], Result], parameters: Parameters) -> Result:
+    """Call a function of the named variables.
+
+    Args:
+        name: of the function, for messages.
+        function: traceable.
+        parameters: values by the names of the variables.
+
+    Raises:
+        ValueError: where it asks for a variable that does not exist.
+        TypeError: where it needs the value of a traced number.
+    """
+    try:
+        return function(parameters)
+    except KeyError as error:
+        missing = error.args[0] if error.args else None
+        if not isinstance(missing, str) or missing in parameters:
+            raise
+        known = ", ".join(parameters)
+        raise ValueError(f'{name}: asks for "{missing}", which is not a variable, must be one of {known}') from error
+    except jax.errors.ConcretizationTypeError as error:
+        raise TypeError(
+            f"{name}: needs the value of a variable (by if, and, or, not, min, max, float or int), but variables are "
+            "traced: use jax.numpy.where, minimum or maximum, and no other kind of modification"
+        ) from error
 
 
 def check_used(owner: str, names: Sequence[str], used: Sequence[str]) -> None:

@@ -69,7 +69,8 @@ def real_or_given(value: object) -> object:
 def no_number(what: str, value: object) -> str:
     """The message that a value is not a number."""
     wanted = "a real number" if getattr(value, "dtype", np.dtype(type(value))).kind == "c" else "a number"
-    return f"{what}{' = ' if what else ''}{shown(value)} must be {wanted}"
+    comma = ", with a decimal point" if isinstance(value, str) and "," in value else ""
+    return f"{what}{' = ' if what else ''}{shown(value)} must be {wanted}{comma}"
 
 
 def optional_real(value: Numbers | None) -> Float[Array, "..."] | None:

@@ -258,7 +258,7 @@ def _check_number(owner: str, name: str, value, kind: Number) -> None:
             whole(owner, name, value, kind.low, kind.high)
             return
         if isinstance(value, bool) or not isinstance(value, float | int | np.floating | np.integer):
-            raise ValueError(f"{owner}: {name} = {value!r} must be a number")
+            raise ValueError(f"{owner}: {no_number(name, value)}")
     else:
         if not isinstance(value, jax.Array) or value.dtype.kind in "bc":  # the converter has left it as it was
             raise ValueError(f"{owner}: {no_number(name, value)}")

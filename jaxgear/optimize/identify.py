@@ -11,7 +11,7 @@ import numpy as np
 import scipy  # its packages load when they are used
 from jaxtyping import Array, Bool, Float
 
-from ..conditions import Design, Variants, conditions, solve_case, two_modifications
+from ..conditions import Design, Variants, call_with, conditions, solve_case, two_modifications
 from ..conditions.join import side_by_side
 from ..contact import Mesh, removed_material
 from ..contact.solve import check_mesh
@@ -190,7 +190,7 @@ class _Problem(eqx.Module):
     ) -> tuple[Array, Bool[Array, ""]]:
         """Transmission error over the places of all windows, a row per torque."""
         given = dict(zip(self.names, self.mean[: self.own] + self.spread[: self.own] * own))
-        pinion, wheel = two_modifications(self.design(given))
+        pinion, wheel = two_modifications(call_with("design", self.design, given))
         scale, offset = given.get(TORQUE_SCALE, jnp.ones_like(own[0])), given.get(OFFSET, jnp.zeros_like(own[0]))
 
         def at(torque: Scalar):

@@ -16,6 +16,7 @@ from ..conditions import (
     Design,
     Modifications,
     Variants,
+    call_with,
     check_used,
     conditions,
     cycle_status,
@@ -137,7 +138,7 @@ class Problem(eqx.Module):
         Raises:
             ValueError: when the design gives anything but two modifications.
         """
-        return two_modifications(self.design(self.parameters(x)))
+        return two_modifications(call_with("design", self.design, self.parameters(x)))
 
     def score(self, x: Vector) -> Score:
         """True objectives and violation."""

@@ -139,9 +139,15 @@ def box(owner: str, bounds: Bounds) -> tuple[tuple[str, ...], tuple[float, ...],
     Raises:
         ValueError: for no parameter, and for bounds that are not finite or do not ascend.
     """
+    if not isinstance(bounds, Mapping):
+        kind = type(bounds).__name__
+        raise ValueError(f'{owner}: bounds is a {kind}, must be a dict such as {{"amount": (0.0, 20.0)}}')
     if not bounds:
         raise ValueError(f"{owner}: bounds must name at least one parameter")
-    for name, (low, high) in bounds.items():
+    for name, ends in bounds.items():
+        if np.shape(ends) != (2,):
+            raise ValueError(f"{owner}: bounds of {name} = {ends!r} must be two numbers, (low, high)")
+        low, high = ends
         check(owner, f"lower bound of {name}", low, "")
         check(owner, f"upper bound of {name}", high, "", low=low, open_low=True)
     return tuple(bounds), tuple(low for low, _ in bounds.values()), tuple(high for _, high in bounds.values())

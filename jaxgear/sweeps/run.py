@@ -100,11 +100,15 @@ def sweep(
         `contact.Status` in small letters, such as "more_pairs_needed".
 
     Raises:
+        TypeError: for something else than a plan, and for functions that need the value of a traced variable.
         ValueError: for arguments out of range, unknown results, variables on which nothing depends, and an output
             folder that cannot be used or holds a sweep of other settings.
     """
     if part_rows is not None:
         whole("sweep", "part_rows", part_rows)
+    if not isinstance(plan, AbstractPlan):
+        kind = type(plan).__name__
+        raise TypeError(f"sweep: plan is a {kind}, must be FullFactorial, LatinHypercube, Sobol or VariantList")
     example = plan.rows(0, 1)[0]
     made = variants(
         "sweep",
