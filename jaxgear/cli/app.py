@@ -13,6 +13,7 @@ from typing import Annotated, Any, Literal, NoReturn
 import typer
 from typer.core import TyperGroup
 
+from ..io.first_look import check_keys
 from ..studies import registry
 from ..studies.version import version as own_version
 from . import interrupt, streams
@@ -113,12 +114,20 @@ def _run(
         file, output, no_figures, reported, no_cache: options that all studies have.
         options: further ones of this study.
     """
+    if place.startswith("jaxgear."):
+        _look_at(file)
     with interrupt.importing():
         from . import run
 
         study = registry.load(place)
     shared: dict[str, Any] = {"figures": not no_figures, "cache": not no_cache, "command": typed(context, reported)}
     return OK if run.run_study(partial(study.of, **options), file, output, **shared) else NOT_CONVERGED
+
+
+def _look_at(file: Path) -> None:
+    """Reports a misspelt key before JAX is imported, which takes seconds."""
+    if "jax" not in sys.modules:
+        check_keys(file)
 
 
 def _study(place: str, name: str) -> Callable[..., int]:
@@ -248,6 +257,7 @@ def sweep(
     The folder "table" of the results holds it and nothing else: pandas, polars and Arrow read it as a whole. An
     interrupted sweep goes on where it was when the command is repeated.
     """
+    _look_at(file)
     with interrupt.importing():
         from . import devices, sweep
     devices.use_all_cores()

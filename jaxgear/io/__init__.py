@@ -1,40 +1,9 @@
-"""Files: design files (TOML) in, results (JSON, CSV) out, gear pairs exchanged with other programs (REXS)."""
+"""Files: design files (TOML) in, results (JSON, CSV) out, gear pairs exchanged with other programs (REXS).
 
-from .design_file import DesignFile as DesignFile
-from .design_file import load_design as load_design
-from .dynamics_table import DynamicsRequest as DynamicsRequest
-from .dynamics_table import dynamics_request as dynamics_request
-from .errors import DesignFileError as DesignFileError
-from .flanks import read_flank as read_flank
-from .folder import result_folder as result_folder
-from .folder import writing as writing
-from .layout_table import LayoutRequest as LayoutRequest
-from .layout_table import layout_request as layout_request
-from .measured_te import read_measurement as read_measurement
-from .named_quantities import quantities_of_tables as quantities_of_tables
-from .optimize_table import OptimizeRequest as OptimizeRequest
-from .optimize_table import optimize_request as optimize_request
-from .rating import LubricantSection as LubricantSection
-from .reference import reference as reference
-from .results import describe as describe
-from .results import flank_rows as flank_rows
-from .results import write_flanks as write_flanks
-from .results import write_front as write_front
-from .results import write_summary as write_summary
-from .results import write_traces as write_traces
-from .results import write_wheel_drawing as write_wheel_drawing
-from .results import write_wheel_points as write_wheel_points
-from .rexs import RexsPair as RexsPair
-from .rexs import RexsStage as RexsStage
-from .rexs import read_rexs as read_rexs
-from .rexs import rexs_stages as rexs_stages
-from .rexs import write_rexs as write_rexs
-from .rows import read_variants as read_variants
-from .sweep_table import SweepRequest as SweepRequest
-from .sweep_table import sweep_request as sweep_request
-from .teeth_table import teeth_of as teeth_of
-from .wear_table import WearRequest as WearRequest
-from .wear_table import wear_request as wear_request
-from .worn import read_worn as read_worn
-from .worn import write_worn as write_worn
-from .write_design import write_design as write_design
+The public names are listed in `__init__.pyi` and imported when they are asked for: the command line looks at the keys
+of a file (`first_look`) before it imports JAX.
+"""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

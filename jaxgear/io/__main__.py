@@ -1,5 +1,11 @@
-"""`python -m jaxgear.io` prints every table and key of a design file."""
+"""`python -m jaxgear.io` prints every table and key of a design file, with `keys` their names as JSON."""
 
-from .reference import reference
+import json
+import sys
 
-print(reference(), end="")
+from .reference import known_keys, reference
+
+if sys.argv[1:] == ["keys"]:
+    print(json.dumps(known_keys(), indent=1))
+else:
+    print(reference(), end="")

@@ -16,7 +16,7 @@ from ..geometry import Material
 from ..microgeometry import AbstractCurve, AbstractModification
 from ..shafts import Misalignment
 from ..vocabulary import quantities
-from . import gearbox
+from . import first_look, gearbox
 from .design_file import file_section
 from .flanks import FlankFileSection
 from .gears import GearSection, PairSection
@@ -64,6 +64,26 @@ def reference() -> str:
     tables = (line for title, section in _tables() for line in _table(title, section))
     contents = (f"- [{_heading(title)}](#{_anchor(title)})" for title in (*(one for one, _ in _tables()), _QUANTITIES))
     return "\n".join([_HEAD.rstrip(), "\nTables:\n", *contents, *tables, *_quantities()]) + "\n"
+
+
+def known_keys() -> dict[str, list[str]]:
+    """Keys of the tables that `first_look` checks, by the kind of table."""
+    further = further_tables(users=False)
+    sections: dict[str, type[FileTable]] = {
+        "": file_section(further),
+        **dict.fromkeys(first_look.GEARS, GearSection),
+        "pair": PairSection,
+        "load": LoadSection,
+        "model": ModelSection,
+        "misalignment": section_of(Misalignment),
+        "resolution": ResolutionSection,
+        first_look.MATERIAL: section_of(Material),
+        first_look.VARIABLE: VariableSection,
+        **further,
+    }
+    kinds = family(AbstractModification, users=False)
+    types = {first_look.MODIFICATION.format(name): ["type", *section_of(cls).keys] for name, cls in kinds.items()}
+    return {**{name: [*section.keys] for name, section in sections.items()}, **types}
 
 
 def _heading(title: str) -> str:

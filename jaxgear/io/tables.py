@@ -7,6 +7,7 @@ derived from `FurtherTable`, or a class of settings derived from `Checked`, of t
 
 import functools
 import inspect
+import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -171,10 +172,19 @@ def further_tables(*, users: bool = True) -> dict[str, type[FurtherTable]]:
     Args:
         users: with those that are defined outside the library.
     """
+    _import_public()
     found = [cls for base in (Checked, FurtherTable) for cls in descendants(base) if _names_a_table(cls)]
     library = {cls.table: cls for cls in found if cls.__module__.startswith("jaxgear.")}
     own = {cls.table: cls for cls in found if users and cls.table not in library}
     return {name: _table_of(cls).now() for name, cls in sorted((library | own).items())}
+
+
+@functools.cache
+def _import_public() -> None:
+    """Imports all of this package: a class is a table once it exists."""
+    package = sys.modules[__package__]
+    for name in package.__all__:
+        getattr(package, name)
 
 
 def _names_a_table(cls: Any) -> bool:

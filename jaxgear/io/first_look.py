@@ -1,0 +1,51 @@
+"""A first look at the keys of a design file, without JAX: a misspelt key is reported in a fraction of a second.
+
+`keys.json` holds the keys of the library's tables. It is generated from the classes that read them:
+
+    python -m jaxgear.io keys > keys.json && mv keys.json jaxgear/io/
+"""
+
+import json
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from .errors import DesignFileError, join, naming
+from .toml import read
+from .trade_words import unknown_key
+
+MODIFICATION, MATERIAL, VARIABLE = "modification of type {}", "material", "variable"
+GEARS = "pinion", "wheel"
+KEYS = Path(__file__).with_name("keys.json")
+
+
+def check_keys(path: Path) -> None:
+    """Check the keys of the tables that no other package can extend; everything else is left to `load_design`.
+
+    Raises:
+        DesignFileError: for a file that is not TOML, and for an unknown key.
+    """
+    known = {name: set(keys) for name, keys in json.loads(KEYS.read_text(encoding="utf-8")).items()}
+    with naming(path):
+        says = read(path)
+        for key, table, kind in _tables(says):
+            unknown = next((name for name in table if name not in known.get(kind, table)), None)
+            if unknown is not None:
+                raise DesignFileError(join(key, unknown), unknown_key(unknown, known[kind]))
+
+
+def _tables(says: Mapping[str, Any]) -> Iterator[tuple[str, Mapping[str, Any], str]]:
+    """Dotted key, content and kind of the tables of a file."""
+    yield "", says, ""
+    for name, table in says.items():
+        if not isinstance(table, dict):
+            continue
+        several = {"materials": MATERIAL, "variables": VARIABLE}.get(name)
+        if several is None:
+            yield name, table, name
+        else:
+            yield from ((join(name, own), each, several) for own, each in table.items() if isinstance(each, dict))
+        given = table.get("modification") if name in GEARS else None
+        for number, each in enumerate(given if isinstance(given, list) else []):
+            if isinstance(each, dict):
+                yield f"{name}.modification[{number}]", each, MODIFICATION.format(each.get("type"))
