@@ -16,7 +16,8 @@ from jaxgear.io import DesignFileError, load_design, read_rexs, write_design, wr
 from jaxgear.io.rexs.values import frames
 from jaxgear.io.write_design import write_starter
 from jaxgear.manufacture import span
-from jaxgear.studies.gear_data import gears
+from jaxgear.studies.gear_data import _FACTORS as FACTORS
+from jaxgear.studies.gear_data import gears, mounting, rating_page
 
 ANGLE = "helix_angle = 15.0"
 OPEN = 'helix_angle = "beta"'
@@ -225,6 +226,19 @@ def test_the_tables_of_a_run_have_the_numbers_of_iso_21771(load):
     teeth = found["drawing"]["wheel"]["teeth_spanned"]
     wheel = load(pinion=ANGLE).pair().wheel
     assert found["drawing"]["wheel"]["span_upper_limit_mm"] == pytest.approx(float(span(wheel, teeth)), rel=1e-12)
+
+
+def test_the_backlash_that_is_said_is_the_one_that_is_given(load):
+    """Normal to the flanks, as the comment of the template has it; the transverse one is larger by 1 / cos(beta_b)."""
+    file = load(pinion=ANGLE, tail="[pair]\nbacklash = 50.0")
+    assert mounting(file).endswith("backlash normal to the flanks 50 um")
+    transverse = gears(file)["geometry"]["pair"]["backlash_on_line_of_action_um"]
+    assert float(transverse) == pytest.approx(50 / np.cos(np.deg2rad(14.0761)), rel=1e-5)
+
+
+def test_a_symbol_that_the_words_end_with_is_not_repeated():
+    rows = {row[0] for row in rating_page({"design": dict.fromkeys(FACTORS, 1.0)}).tables[0].rows}
+    assert "face load factor K_Hbeta" in rows and not any("K_Hbeta, K_Hbeta" in row for row in rows)
 
 
 def test_new_writes_a_helical_pair_that_is_read(tmp_path):

@@ -223,6 +223,8 @@ def _validity(found: CommandResult, data: Mapping[str, Any]) -> Chapter:
 def _inputs(design: DesignFile, data: Mapping[str, Any], found: CommandResult) -> Chapter:
     """What was assumed."""
     given = {name: data[name] for name in _INPUTS if data.get(name) is not None}
+    if "resolution" in given:  # without what is left to its default
+        given["resolution"] = {name: size for name, size in given["resolution"].items() if size is not None}
     held = f"{found.left_out[:1].upper()}{found.left_out[1:]}." if found.left_out else _SUPPORTED
     points = [*_ASSUMED, *found.assumptions, _RIGID if design.support is None else held]
     if design.resolution().slices == 1:

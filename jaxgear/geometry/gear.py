@@ -247,7 +247,7 @@ def with_diameters(gear: Gear) -> Gear:
 
 
 def check_spur(owner: str, *gears: Gear) -> None:
-    """Refuses helical gears, for what does not know them yet.
+    """Refuses helical gears, for what covers spur gears alone.
 
     Raises:
         ValueError: for a gear with a helix angle that is not known to be zero.
@@ -257,7 +257,7 @@ def check_spur(owner: str, *gears: Gear) -> None:
             assert gear.helix_angle is not None
             angle = concrete(gear.helix_angle)
             given = "is traced" if angle is None else f"= {float(np.ravel(angle)[0]):g} deg"
-            raise ValueError(f"{owner}: helix_angle {given}, must be 0 deg: helical gears are not known here yet")
+            raise ValueError(f"{owner}: helix_angle {given}, must be 0 deg: spur gears alone are covered")
 
 
 def virtual_gear(gear: Gear) -> Gear:

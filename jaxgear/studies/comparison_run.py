@@ -71,7 +71,8 @@ class ComparisonRun:
 
     def _make_tables(self, finer: int | None, *, required: bool) -> None:
         """Before the search: what cannot be verified is known at once, and an interruption costs no optimum."""
-        self._stages.begin("finite-element tables of pinion and wheel, made once and kept")
+        if self._mesh.pair.is_spur:  # others are refused at once
+            self._stages.begin("finite-element tables of pinion and wheel, made once and kept")
         try:
             self._second = structure_for(self._mesh)
         except ValueError as error:

@@ -125,7 +125,8 @@ def rating_page(designs: Mapping[str, Factors]) -> Chapter:
 def _label(name: str, symbols: Mapping[str, str]) -> str:
     """A number in words, with its symbol and unit."""
     words, bracket, unit = heading(name).partition(" [")
-    return f"{words}, {symbols[name]}".rstrip(", ") + bracket + unit
+    symbol = "" if words.endswith(symbols[name]) else f", {symbols[name]}"
+    return f"{words}{symbol}{bracket}{unit}"
 
 
 # the names of ISO 21771 with the unit, in the order of their numbers below
@@ -156,6 +157,7 @@ _HELICAL_GEAR = (
     "transverse_pressure_angle_deg",
     "virtual_number_of_teeth",
 )
+_BACKLASH = "backlash_on_line_of_action_um"
 _PAIR = (
     "center_distance_mm",
     "working_pressure_angle_deg",
@@ -169,7 +171,7 @@ _PAIR = (
     "path_of_contact_B_mm",
     "path_of_contact_D_mm",
     "path_of_contact_E_mm",
-    "backlash_on_line_of_action_um",
+    _BACKLASH,
     "least_backlash_on_line_of_action_um",
     "largest_backlash_on_line_of_action_um",
 )
@@ -208,8 +210,10 @@ def mounting(file: DesignFile) -> str:
         texts.append(f"{name} {float(shape[name]['bore_diameter_mm']):.4g} mm{guess}")
     pair = shape["pair"]
     mounted = f"centre distance {float(pair['center_distance_mm']):.6g} mm"
-    backlash = round(float(pair["backlash_on_line_of_action_um"]), 3) + 0.0  # rounding leaves no -0
-    return f"bores: {', '.join(texts)}; {mounted}, backlash on the line of action {backlash:g} um"
+    helical = "normal_backlash_um" in pair  # as pair.backlash has it
+    name, where = ("normal_backlash_um", "normal to the flanks") if helical else (_BACKLASH, "on the line of action")
+    backlash = round(float(pair[name]), 3) + 0.0  # rounding leaves no -0
+    return f"bores: {', '.join(texts)}; {mounted}, backlash {where} {backlash:g} um"
 
 
 @program

@@ -53,7 +53,7 @@ def table(file: DesignFile, evaluations: Evaluations) -> Table:
         result.add_row(label, *(cells.get(label, "-") for cells in flanks))
     if any(flanks):
         result.add_section()
-    result.add_row("time [s]", *(f"{evaluation.seconds:.2f}" for evaluation in evaluations.values()))
+    result.add_row("computing time [s]", *(f"{evaluation.seconds:.2f}" for evaluation in evaluations.values()))
     return result
 
 

@@ -39,8 +39,9 @@ def versions() -> dict[str, str]:
 
 
 def sizes(of: Resolution) -> dict[str, Any]:
-    """Array sizes by name."""
-    return {field.name: getattr(of, field.name) for field in dataclasses.fields(of)}
+    """Array sizes by name, with the slide steps that are chosen where none are given."""
+    given = {field.name: getattr(of, field.name) for field in dataclasses.fields(of)}
+    return given | {"slide_steps": of.chosen_slide_steps}
 
 
 def model(mesh: Mesh) -> dict[str, Any]:

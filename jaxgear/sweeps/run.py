@@ -70,7 +70,7 @@ def sweep(
         jg.sweep(
             lambda v: (jg.TipRelief(v["amount"], 4.0), None),
             plan,
-            mesh=lambda v: jg.prepare(pair_of(v["shift"]), resolution=jg.Resolution(positions=32, pairs=2)),
+            mesh=lambda v: jg.prepare(pair_of(v["shift"]), resolution=jg.Resolution(positions=32)),
             torque=lambda v: v["torque"],
         )
 
