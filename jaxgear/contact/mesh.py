@@ -205,22 +205,25 @@ def prepare(
     deflection: float | None = None,
     support: AbstractSupport | None = None,
 ) -> Mesh:
-    """Prepares a gear pair for `solve`: contact points, corner gaps and compliances over one base pitch.
+    """Prepare a gear pair for `solve` over one base pitch: points of contact, gaps of the tip corners, compliances.
+
+    The mesh holds all that depends neither on the torque nor on the modifications; it is made once and shared by any
+    number of them. It is differentiable with respect to every number of pair, compliance and support.
 
     Args:
-        pair: gear pair; every number in it may be traced.
+        pair: gear pair, concrete or traced.
         compliance: compliance model; None for `default_compliance()`.
         resolution: array sizes; None for `Resolution()`, of helical gears with the slices of `helical_slices`.
-        deflection: transmission error that the pairs have to contain where the resolution leaves their number open
-            [um]; None for 16 um per mm of module, at which root stresses are beyond 1000 MPa. Gears that are traced
-            take four pairs.
-        support: what shafts, bearings, housing and misalignment do to the gap over the face, as `support` of a gearbox
-            gives it; None for rigid, parallel shafts. It needs coupled slices, and bends over the face in
-            as many polynomials as the resolution has `face_modes`. That of a gearbox holds at the gearbox's torque,
-            which `solve` and the like then ask for. Transmission error and stiffness contain its deflection.
+        deflection: transmission error up to which the number of tooth pairs is chosen [um], shape (); it counts where
+            `resolution.pairs` is None. None for 16 um per mm of module, at which root stresses are beyond 1000 MPa.
+            Traced gears take four pairs whatever it is.
+        support: deflection of shafts, bearings and housing, or misalignment, as `support` of a gearbox gives it; None
+            for rigid, parallel shafts. It needs coupled slices and takes `resolution.face_modes` polynomials over the
+            face. The support of a gearbox is linearized at one torque, and `solve` refuses another one. Transmission
+            error and stiffness contain the deflection of the support.
 
     Returns:
-        the mesh, to be shared by any number of modifications and torques.
+        the mesh.
 
     Raises:
         ValueError: when the path of contact is longer than the pairs of the resolution can cover, or the compliance is

@@ -64,6 +64,8 @@ def solve(
     Returns:
         the mesh cycle, differentiable with respect to every number in `mesh`, `torque` and the modifications. Where
         the number of pairs was left open, is too small for this load, and nothing is traced, it has more of them.
+        While anything is traced the pairs stay as they are: the numbers are finite, and `status` says that more pairs
+        are needed. `optimize.evaluate` gives NaN there.
 
     Raises:
         TypeError: for something else than a prepared mesh or a modification.

@@ -33,8 +33,18 @@ class Harmonics(Checked):
 def peak_to_peak(curve: Curve) -> Float[Array, "..."]:
     """Largest minus smallest value over the positions (PPTE for a transmission error, in um).
 
-    It touches two positions only, the first ones on ties: report it, and follow `smooth_peak_to_peak` or the harmonics
-    when optimizing. NaN is passed on even where the reductions of the backend would drop it.
+    Its gradient is that of two positions, of the largest and of the smallest value; where several positions share an
+    extreme value, that of the first of them. Report it, and optimize `smooth_peak_to_peak` or harmonics where gradients
+    are followed. NaN at any position gives NaN, also on backends whose reductions drop it.
+
+    It knows a curve and no status: the transmission error of a mesh cycle that has not converged is finite. Under
+    `jax.jit` and `jax.vmap` take `optimize.evaluate("ppte", ...)`, which gives NaN there, or look at `cycle.converged`.
+
+    Args:
+        curve: values over the positions, which are the last axis.
+
+    Returns:
+        largest minus smallest value, in the unit of the curve, of the shape of the other axes.
     """
     return spread(curve, axis=-1)
 

@@ -32,13 +32,17 @@ def counted(violation: Violation) -> Violation:
 
 
 class Constraint(Checked):
-    """A number of the design that has to stay within limits, in every case.
+    """Limits of a quantity, or of a weighted sum of the free parameters, in every case of a problem.
+
+        Constraint("max_flank_pressure", high=1500.0)
+        Constraint({"pinion_amount": 1.0, "wheel_amount": -1.0}, low=0.0)  # pinion_amount >= wheel_amount
 
     Attributes:
-        quantity: that is limited, given by its name ("max_flank_pressure"), as a `Quantity`, or as a function of a
-            cycle; None for a linear constraint on the free parameters.
-        terms: of such a constraint, given as coefficients by the name of a parameter; else none.
-        low, high: limits in the unit of the number; None for no limit.
+        quantity: limited quantity, given by its name, as a `Quantity`, or as a function of a mesh cycle; None where a
+            sum of parameters is limited.
+        terms: pairs (name of a free parameter, factor) of the limited sum; empty where a quantity is limited.
+        low, high: least and largest allowed value, in the unit of the quantity or of the sum, shape (); None for no
+            limit. One of them at least is given.
     """
 
     quantity: Quantity | None
@@ -62,19 +66,19 @@ class Constraint(Checked):
         check("Constraint", "high", self.high, "", low=self.low)
 
     def of_parameters(self, parameters: Mapping[str, Any]) -> Scalar:
-        """What a linear constraint limits."""
+        """Weighted sum of the free parameters that a linear constraint limits, shape ()."""
         return sum(factor * parameters[name] for name, factor in self.terms)
 
     @property
     def name(self) -> str:
-        """What it limits, in words."""
+        """Name of the quantity, or the sum as text: "1 pinion_amount + -1 wheel_amount"."""
         if self.quantity is not None:
             return self.quantity.name
         return " + ".join(f"{factor:g} {name}" for name, factor in self.terms)
 
     @property
     def unit(self) -> str:
-        """Of the limits; "" for a pure number and where it is not known."""
+        """Unit of the limits; "" for a pure number and for a sum of parameters."""
         return "" if self.quantity is None else self.quantity.unit
 
     @property
