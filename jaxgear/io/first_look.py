@@ -48,4 +48,5 @@ def _tables(says: Mapping[str, Any]) -> Iterator[tuple[str, Mapping[str, Any], s
         given = table.get("modification") if name in GEARS else None
         for number, each in enumerate(given if isinstance(given, list) else []):
             if isinstance(each, dict):
-                yield f"{name}.modification[{number}]", each, MODIFICATION.format(each.get("type"))
+                own = {key: value for key, value in each.items() if key != "type"}
+                yield f"{name}.modification[{number}]", own, MODIFICATION.format(each.get("type"))

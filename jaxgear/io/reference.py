@@ -66,10 +66,11 @@ def reference() -> str:
     return "\n".join([_HEAD.rstrip(), "\nTables:\n", *contents, *tables, *_quantities()]) + "\n"
 
 
-def known_keys() -> dict[str, list[str]]:
-    """Keys of the tables that `first_look` checks, by the kind of table."""
+def checked_tables() -> dict[str, type[FileTable]]:
+    """Tables whose keys `first_look` checks, by their kind."""
     further = further_tables(users=False)
-    sections: dict[str, type[FileTable]] = {
+    kinds = family(AbstractModification, users=False)
+    return {
         "": file_section(further),
         **dict.fromkeys(first_look.GEARS, GearSection),
         "pair": PairSection,
@@ -80,10 +81,13 @@ def known_keys() -> dict[str, list[str]]:
         first_look.MATERIAL: section_of(Material),
         first_look.VARIABLE: VariableSection,
         **further,
+        **{first_look.MODIFICATION.format(name): section_of(cls) for name, cls in kinds.items()},
     }
-    kinds = family(AbstractModification, users=False)
-    types = {first_look.MODIFICATION.format(name): ["type", *section_of(cls).keys] for name, cls in kinds.items()}
-    return {**{name: [*section.keys] for name, section in sections.items()}, **types}
+
+
+def known_keys() -> dict[str, list[str]]:
+    """Keys of these tables as a file may write them."""
+    return {kind: [*section.keys] for kind, section in checked_tables().items()}
 
 
 def _heading(title: str) -> str:
