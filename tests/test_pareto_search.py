@@ -143,6 +143,15 @@ def test_limits_that_no_design_keeps(known):
         three_within(known, -41.0, steps=2)
 
 
+@pytest.mark.slow
+def test_a_front_without_a_solved_design_says_why(known):
+    broken = eqx.tree_at(lambda m: m.structure, known.mesh, np.full(known.mesh.structure.shape, np.nan))
+    method = jg.optimize.Pareto(points=4, steps=2)
+    options = {"objectives": VOLUME, "method": method, "positions": None}
+    with pytest.raises(RuntimeError, match="designs tried: the iteration did not converge: raise newton_steps"):
+        jg.optimize.pareto(known.parabolas, BOX, mesh=broken, torque=known.torque, **options)
+
+
 @pytest.mark.parametrize(("options", "words"), [({"points": 1}, "points = 1"), ({"steps": 0}, "steps = 0")])
 def test_refuses_what_makes_no_front(options, words):
     with pytest.raises(ValueError, match=words):

@@ -55,6 +55,7 @@ class Met:
         self._low: np.ndarray = np.zeros(objectives) if frame is None else frame[0]
         self._span: np.ndarray = np.ones(objectives) if frame is None else frame[1]
         self._worst = np.full(objectives, -np.inf)
+        self._solved = False  # the contact of any design so far
 
     @property
     def found(self) -> bool:
@@ -67,7 +68,9 @@ class Met:
 
     def take(self, point: np.ndarray, model: LinearModel) -> None:
         """Keeps a design until the next look."""
-        if np.isfinite(model.values).all() and not counted(model.violation):
+        solved = bool(np.isfinite(model.values).all())
+        self._solved |= solved
+        if solved and not counted(model.violation):
             self._new.append((point, model.values))
 
     def look(self, step: int, steps: int) -> None:
@@ -112,8 +115,10 @@ class Met:
         """Keeps at most so many designs; where none keeps the limits, one that does is sought before.
 
         Raises:
-            RuntimeError: when no design keeps the constraints.
+            RuntimeError: when no design keeps the constraints, or none has a converged contact solution.
         """
+        if not self._solved:
+            self.record.check()
         if not self.found and self.record.linearizer is not None:
             seek_limits(self.record.linearizer, self, self.compromise()[0])
         if not self.found:
