@@ -130,10 +130,8 @@ class Column:
         return f"{torque}{speed}" + (f"_{self.statistic}" if self.statistic else "")
 
 
-# first of a table, and its last two
-NUMBER, FLAG, CAUSE = (
-    Column(described(name), kind) for name, kind in ((VARIANT, "number"), (CONVERGED, "flag"), (STATUS, "status"))
-)
+NUMBER = Column(described(VARIANT), "number")  # first of a table
+FLAG, CAUSE = Column(described(CONVERGED), "flag"), Column(described(STATUS), "status")  # last of a table
 
 
 def axis_label(of: Quantity | Column) -> str:
