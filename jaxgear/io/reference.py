@@ -16,7 +16,7 @@ from ..geometry import Material
 from ..microgeometry import AbstractCurve, AbstractModification
 from ..shafts import Misalignment
 from ..vocabulary import quantities
-from . import first_look, gearbox
+from . import first_look, gearbox, imperial
 from .design_file import file_section
 from .flanks import FlankFileSection
 from .gears import GearSection, PairSection
@@ -87,7 +87,10 @@ def checked_tables() -> dict[str, type[FileTable]]:
 
 def known_keys() -> dict[str, list[str]]:
     """Keys of these tables as a file may write them."""
-    return {kind: [*section.keys] for kind, section in checked_tables().items()}
+    found = {}
+    for kind, section in checked_tables().items():
+        found[kind] = [*section.keys, *imperial.names({name: key.kind.number for name, key in section.keys.items()})]
+    return found
 
 
 def _heading(title: str) -> str:
