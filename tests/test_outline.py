@@ -107,3 +107,35 @@ def test_derivatives_of_the_outline_by_module_and_shift(teeth, shift):
     value, jacobian, steps = jax.jit(lambda x, a: (numbers(x), jax.jacfwd(numbers)(x), jax.vmap(numbers)(a)))(x, around)
     np.testing.assert_allclose(jacobian.T, (steps[:2] - steps[2:]) / (2 * h), rtol=1e-6, atol=1e-8)
     np.testing.assert_allclose(jacobian[:, 0] * 2.0, value * jnp.asarray([1.0, 0.0, 0.0, 1.0]), atol=1e-9)
+
+
+HELICAL = {
+    # form diameters that listings print for the generating profile shift
+    82.843: dict(teeth=25, module=3.0, profile_shift=0.2611, helix_angle=30.0, dedendum=1.25, root_radius=0.38),
+    132.673: dict(teeth=40, module=3.0, profile_shift=-0.1527, helix_angle=-30.0, dedendum=1.25, root_radius=0.38),
+    126.527: dict(teeth=25, module=5.0, profile_shift=0.2184, helix_angle=20.0, dedendum=1.25, root_radius=0.30),
+    328.991: dict(teeth=24, module=14.0, profile_shift=0.48, helix_angle=10.0, dedendum=1.25, root_radius=0.38),
+}
+
+
+@pytest.mark.parametrize("printed", HELICAL)
+def test_the_tip_circle_of_the_rack_is_that_of_the_normal_section(printed):
+    """Form diameters as printed; the transverse section of the rack's tip touches the whole fillet from outside."""
+    helical = jg.Gear(face_width=30.0, **HELICAL[printed])
+    tooth = outline(helical)
+    # the shift is printed with four digits
+    rounded = 0.5e-4 * 2 * float(helical.module) / np.sin(float(helical.transverse_pressure_angle))
+    assert float(jg.geometry.diameter(helical, tooth.form_roll_length)) == pytest.approx(printed, abs=5e-4 + rounded)
+    np.testing.assert_allclose(
+        trochoid(helical, tooth.junction), involute_point(helical, tooth.form_roll_length), rtol=1e-12
+    )
+
+    r, m, cosine = (float(each) for each in (helical.pitch_radius, helical.module, helical.helix_cosine))
+    alpha, height, rho = np.deg2rad(20.0), HELICAL[printed]["dedendum"] * m, HELICAL[printed]["root_radius"] * m
+    centre = np.pi * m / 4 + height * np.tan(alpha) + rho * (1 - np.sin(alpha)) / np.cos(alpha)  # off the tooth's middle
+    depth = height - float(helical.profile_shift) * m - rho
+    x, y = (np.asarray(each)[:, None] for each in trochoid(helical, jnp.linspace(tooth.junction, jnp.pi / 2, 9)))
+    turn = np.linspace(-0.1, 0.4, 20_001)
+    along = x * np.cos(turn) - y * np.sin(turn) - (centre / cosine - r * turn)
+    above = x * np.sin(turn) + y * np.cos(turn) - (r - depth)
+    np.testing.assert_allclose((np.hypot(along * cosine, above) / rho).min(axis=1), 1.0, atol=1e-6)

@@ -1,11 +1,11 @@
 """The rack-generated tooth outline: trochoid fillet joined to the involute, undercut included.
 
-Of helical gears it is that of the transverse section. There the rack's tip is an ellipse; the circle of the normal
-section stands for it, which is close enough for compliances.
+Of helical gears it is that of the transverse section. The basic rack is that of the normal section: in the transverse
+one it is 1 / cos(beta) times as long along its pitch line, which makes an ellipse of the circle at its tip.
 
-Tooth frame: origin in the gear centre, y along the tooth centreline, x to the side. The trochoid is the equidistant of
-the path of the rack's tip arc centre, in the parameter g, the inclination of the common normal: g = pi/2 on the root
-circle, g = pressure angle where a tooth without undercut passes into the involute.
+Tooth frame: origin in the gear centre, y along the tooth centreline, x to the side. The trochoid is the envelope of the
+rack's tip, in the parameter g, the inclination of the common normal, which runs through the pitch point: g = pi/2 on the
+root circle, g = pressure angle where a tooth without undercut passes into the involute.
 """
 
 from typing import NamedTuple
@@ -33,6 +33,7 @@ class Curves(NamedTuple):
         base_half_angle: half tooth angle on the base circle [rad].
         tip_roll_length: where the involute ends [mm].
         offset, depth, rounding: `rack_tip` [mm].
+        stretch: 1 / cos(beta), length of the transverse rack over that of the normal one; None of a spur gear.
     """
 
     pitch_radius: Real
@@ -42,16 +43,20 @@ class Curves(NamedTuple):
     offset: Real
     depth: Real
     rounding: Real
+    stretch: Real | None = None
 
     def over(self, shape: tuple[int, ...]) -> "Curves":
         """The same numbers at every point of an array."""
-        return Curves(*(jnp.broadcast_to(number, shape) for number in self))
+        return Curves(*(None if number is None else jnp.broadcast_to(number, shape) for number in self))
 
     def trochoid(self, g: Real) -> tuple[Real, Real]:
         """Point (x, y) [mm] of the fillet at the parameter g [rad]."""
-        r = self.pitch_radius
-        phi = (self.depth / jnp.tan(g) + self.offset) / r
-        distance = self.depth / jnp.sin(g) + self.rounding
+        r, along, rounding = self.pitch_radius, self.offset, self.rounding
+        if self.stretch is not None:  # support point of the ellipse, with half axes of stretch x rounding and rounding
+            rounding = rounding / jnp.sqrt((self.stretch * jnp.cos(g)) ** 2 + jnp.sin(g) ** 2)
+            along = along - (self.stretch**2 - 1) * rounding * jnp.cos(g)
+        phi = (self.depth / jnp.tan(g) + along) / r
+        distance = self.depth / jnp.sin(g) + rounding
         return r * jnp.sin(phi) - distance * jnp.cos(g - phi), r * jnp.cos(phi) - distance * jnp.sin(g - phi)
 
     def half_angle(self, rho: Real) -> Real:
@@ -126,15 +131,19 @@ def outline(gear: Gear) -> Outline:
 def curves(gear: Gear) -> Curves:
     """The numbers that the outline of a gear is drawn by."""
     at_base = half_tooth_angle(gear, jnp.zeros_like(gear.base_radius))
-    return Curves(gear.pitch_radius, gear.base_radius, at_base, gear.tip_roll_length, *rack_tip(gear))
+    stretch = None if gear.helix_angle is None else 1 / gear.helix_cosine
+    return Curves(gear.pitch_radius, gear.base_radius, at_base, gear.tip_roll_length, *rack_tip(gear), stretch)
 
 
 def rack_tip(gear: Gear) -> tuple[Scalar, Scalar, Scalar]:
-    """Centre of the rack's tip arc: distance from the tooth centreline [mm], depth below the pitch line, and radius."""
-    alpha, m, pitch = gear.transverse_pressure_angle, gear.module, jnp.pi * gear.transverse_module
-    tip = gear.root_radius * m
+    """Centre of the rack's tip arc: distance from the tooth centreline [mm], depth below the pitch line, and radius.
+
+    The distance is that of the transverse section; the arc is a circle of that radius in the normal section.
+    """
+    alpha, m = jnp.deg2rad(gear.pressure_angle), gear.module
+    tip, pitch = gear.root_radius * m, jnp.pi * m
     from_rack_centre = pitch / 4 - gear.dedendum * m * jnp.tan(alpha) - (1 - jnp.sin(alpha)) * tip / jnp.cos(alpha)
-    from_centreline = pitch / 2 - from_rack_centre + gear.pitch_radius * gear.thickness_angle
+    from_centreline = (pitch / 2 - from_rack_centre) / gear.helix_cosine + gear.pitch_radius * gear.thickness_angle
     return from_centreline, (gear.dedendum - gear.profile_shift) * m - tip, tip
 
 
@@ -149,9 +158,9 @@ def involute_point(gear: Gear, rho: Real) -> tuple[Real, Real]:
 
 
 def _tangential_form_roll_length(gear: Gear) -> Scalar:
-    """Roll length of the junction at g = pressure angle [mm]; negative where the tooth is undercut."""
-    alpha = gear.transverse_pressure_angle
-    straight = gear.dedendum - gear.profile_shift - gear.root_radius * (1 - jnp.sin(alpha))
+    """Roll length of the junction at g = pressure angle [mm]; negative where the tooth is undercut (ISO 21771, d_Ff)."""
+    alpha, rounded = gear.transverse_pressure_angle, 1 - jnp.sin(jnp.deg2rad(gear.pressure_angle))
+    straight = gear.dedendum - gear.profile_shift - gear.root_radius * rounded
     return gear.pitch_radius * jnp.sin(alpha) - straight * gear.module / jnp.sin(alpha)
 
 
