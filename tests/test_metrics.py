@@ -69,6 +69,37 @@ def test_iso_stiffness(teeth, single, mesh):
     np.testing.assert_allclose([stiffness.single, stiffness.mesh], [single, mesh], rtol=5e-5)
 
 
+def test_iso_stiffness_does_not_depend_on_which_gear_drives():
+    """A published pair whose pinion has more teeth, and gears of equal teeth with different profile shifts."""
+
+    def both(first, second, distance):
+        return [float(jg.sizing.iso_stiffness(jg.GearPair(*gears, distance)).single) for gears in
+                ((first, second), (second, first))]  # fmt: skip
+
+    slow, fast = (
+        jg.Gear(z, 45.0, 20.0, x, face_width=491.0, tip_diameter=d)
+        for z, x, d in ((19, 0.6170, 978.808), (17, 0.8021, 905.470))
+    )
+    assert both(slow, fast, 863.0) == pytest.approx([14.34, 14.34], abs=5e-3)
+    one, other = both(*(jg.Gear(25, 3.0, 20.0, x, face_width=20.0) for x in (0.1, 0.4)), None)
+    assert one == pytest.approx(other, rel=1e-12)
+
+
+def test_blank_factor_of_iso_stiffness():
+    """C_R = 0.898 of a report for b_s = 0.25 b and s_R = 5 m_n; a web wider than 1.2 b counts as that."""
+    solid = jg.Gear(24, 14.0, face_width=360.0)
+    plain = float(jg.sizing.iso_stiffness(jg.GearPair(solid, solid)).mesh)
+
+    def ratio(*gears):
+        return float(jg.sizing.iso_stiffness(jg.GearPair(*gears)).mesh) / plain
+
+    webbed = dataclasses.replace(solid, rim_thickness=70.0, web_thickness=90.0)
+    assert ratio(webbed, webbed) == pytest.approx(0.898, abs=5e-4)
+    assert ratio(webbed, solid) == pytest.approx(0.5 * (1 + ratio(webbed, webbed)), rel=1e-12)
+    wide, wider = (dataclasses.replace(webbed, web_thickness=b) for b in (432.0, 500.0))
+    assert ratio(wide, wide) == pytest.approx(ratio(wider, wider), rel=1e-12)
+
+
 def test_harmonics_of_a_known_curve():
     psi = np.arange(32.0) / 32.0 - 0.5
     angle = 2 * np.pi * psi

@@ -7,7 +7,7 @@ References:
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ..geometry import GearPair, path_of_contact
+from ..geometry import Gear, GearPair, path_of_contact
 from ..numerics import Checked, Given, check, program, real, result
 
 Scalar = Float[Array, ""]
@@ -16,10 +16,11 @@ Scalar = Float[Array, ""]
 _Q = (0.04723, 0.15551, 0.25791, -0.00635, -0.11654, -0.00193, -0.24188, 0.00529, 0.00182)
 _MODEL_FACTOR = 0.8  # C_M, measured to theoretical single stiffness
 _LIGHT_LOAD = 100.0  # line load [N/mm] below which c' falls with its fourth root
+_WEB_SHARES, _THINNEST_RIM = (0.2, 1.2), 1.0  # limits of b_s / b and s_R / m_n in C_R
 
 
 class IsoStiffness(Checked):
-    """Tooth stiffness of ISO 6336-1 Method B, solid disc bodies.
+    """Tooth stiffness of ISO 6336-1 Method B.
 
     Attributes:
         theoretical: c'_th.
@@ -35,6 +36,10 @@ class IsoStiffness(Checked):
 def iso_stiffness(pair: GearPair, line_load: Given = _LIGHT_LOAD) -> IsoStiffness:
     """Stiffness of ISO 6336-1 Method B, of helical gears with their virtual numbers of teeth and times cos(beta).
 
+    Index 1 of its formulas is the gear with fewer teeth, whichever drives; of equal teeth that with more profile shift.
+    The blank factor C_R = 1 + ln(b_s / b) / (5 exp(s_R / (5 m_n))) is that of gears with `rim_thickness` and
+    `web_thickness`, within 0.2 <= b_s / b <= 1.2 and s_R >= m_n, else 1; of two gears it is the mean.
+
     Args:
         pair: gear pair; the standard covers x1 >= x2 and -0.5 <= x1 + x2 <= 2.
         line_load: F_t K_A / b [N/mm]; below 100 N/mm the stiffness is reduced.
@@ -45,8 +50,11 @@ def iso_stiffness(pair: GearPair, line_load: Given = _LIGHT_LOAD) -> IsoStiffnes
 
 @program
 def _iso_stiffness(pair: GearPair, line_load: Scalar) -> IsoStiffness:
-    pinion, wheel = pair.pinion, pair.wheel
-    z1, z2, x1, x2 = pinion.virtual_teeth, wheel.virtual_teeth, pinion.profile_shift, wheel.profile_shift
+    pinion, wheel = pair.gears
+    more = (pinion.teeth > wheel.teeth) | ((pinion.teeth == wheel.teeth) & (pinion.profile_shift < wheel.profile_shift))
+    of_pinion, of_wheel = ((gear.virtual_teeth, gear.profile_shift) for gear in pair.gears)
+    z1, x1 = (jnp.where(more, other, own) for own, other in zip(of_pinion, of_wheel))
+    z2, x2 = (jnp.where(more, own, other) for own, other in zip(of_pinion, of_wheel))
     c1, c2, c3, c4, c5, c6, c7, c8, c9 = _Q
     q = c1 + c2 / z1 + c3 / z2 + c4 * x1 + c5 * x1 / z1 + c6 * x2 + c7 * x2 / z2 + c8 * x1**2 + c9 * x2**2
     dedendum = 0.5 * (pinion.dedendum + wheel.dedendum)
@@ -54,5 +62,15 @@ def _iso_stiffness(pair: GearPair, line_load: Scalar) -> IsoStiffness:
     first, second = pinion.material.elastic_modulus, wheel.material.elastic_modulus
     steel = 2 * first * second / (first + second) / 206_000.0
     light = jnp.minimum(line_load / _LIGHT_LOAD, 1.0) ** 0.25
-    single = _MODEL_FACTOR * rack * steel * light / q * pinion.helix_cosine
+    blank = 0.5 * (_blank_factor(pinion) + _blank_factor(wheel))
+    single = _MODEL_FACTOR * blank * rack * steel * light / q * pinion.helix_cosine
     return IsoStiffness(1 / q, single, single * (0.75 * path_of_contact(pair).contact_ratio + 0.25))
+
+
+def _blank_factor(gear: Gear) -> Scalar:
+    """C_R of one gear."""
+    if gear.rim_thickness is None or gear.web_thickness is None:
+        return jnp.ones_like(gear.module)
+    web = jnp.clip(gear.web_thickness / gear.face_width, *_WEB_SHARES)
+    rim = jnp.maximum(gear.rim_thickness / gear.module, _THINNEST_RIM)
+    return 1 + jnp.log(web) / (5 * jnp.exp(rim / 5))

@@ -47,6 +47,11 @@ class Gear(Checked):
         bore_diameter: diameter at which the body is rigidly fixed [mm]; None for half the root diameter, which `str`
             prints. For an integral shaft give the shaft's diameter beside the gear. The body is a plane ring: without a
             fixed circle its wind-up has no limit.
+        rim_thickness: s_R, radial thickness of the rim from the root circle to its inside [mm], of a gear with a web;
+            None for a solid body. Together with `web_thickness` it is used by C_R of `iso_stiffness` alone. The
+            contact analysis has a plane ring that is rigid inside of `bore_diameter`: given the inner diameter of the
+            rim it stands for a rim on a web that does not bend, and no ring stands for a web that does.
+        web_thickness: b_s, axial thickness of the web [mm]; None for a solid body.
         tip_form_diameter: d_Fa, where chamfer or rounding of the tip begins and the active flank ends [mm] (ISO 21771);
             None for a flank up to the tip diameter. The path of contact ends there, corner contact is with the edge
             there, and tip reliefs count from it. Chamfers have 45 degrees and must leave some of the tip land.
@@ -82,6 +87,8 @@ class Gear(Checked):
     tip_diameter: Scalar | None = number("mm", low=0.0, open_low=True, optional=True, default=None, kw_only=True)
     tip_form_diameter: Scalar | None = number("mm", low=0.0, open_low=True, optional=True, default=None, kw_only=True)
     bore_diameter: Scalar | None = number("mm", low=0.0, open_low=True, optional=True, default=None, kw_only=True)
+    rim_thickness: Scalar | None = number("mm", low=0.0, open_low=True, optional=True, default=None, kw_only=True)
+    web_thickness: Scalar | None = number("mm", low=0.0, open_low=True, optional=True, default=None, kw_only=True)
     tip_edge_radius: Scalar = number("mm", low=0.0, open_low=True, default=0.1, kw_only=True)
     tooth_thickness_allowance: Scalar = number("um", high=0.0, default=0.0, kw_only=True)
     tooth_thickness_tolerance: Scalar = number("um", low=0.0, default=0.0, kw_only=True)
@@ -91,6 +98,12 @@ class Gear(Checked):
         if self.helix_angle is not None and self.is_spur:
             object.__setattr__(self, "helix_angle", None)  # programs tell spur gears by it, where numbers are traced
         check("Gear", "root_radius", self.root_radius, "x module", low=0.0, high=_rack_radius_limit(self))
+        for name, other in (("rim_thickness", "web_thickness"), ("web_thickness", "rim_thickness")):
+            if getattr(self, name) is None and getattr(self, other) is not None:
+                raise ValueError(f"Gear: {name}: missing, {other} needs it")
+        if self.rim_thickness is not None:
+            body = concrete(self.body_thickness)
+            check("Gear", "rim_thickness", self.rim_thickness, "mm", high=None if body is None else float(body))
         for fault in shape_faults(self):
             raise ValueError(fault)
 
@@ -211,7 +224,7 @@ class Gear(Checked):
         return self.tip_radius - jnp.maximum(self.base_radius, self.root_circle_radius)
 
     @property
-    def rim_thickness(self) -> Real:
+    def body_thickness(self) -> Real:
         """Radial distance from the bore to the root circle [mm]."""
         return self.root_circle_radius - self.bore_radius
 
@@ -308,7 +321,7 @@ def _shape(gear: Gear) -> tuple[Scalar, ...]:
     angle = half_tooth_angle(gear, gear.tip_roll_length)
     left = gear.tip_form_radius * (jnp.sin(angle) + jnp.cos(angle)) - gear.tip_radius
     radii = (gear.tip_radius, gear.tip_form_radius, gear.base_radius, gear.root_circle_radius, gear.bore_radius)
-    margins = gear.tip_height, gear.tip_land, gear.rim_thickness, gear.tip_chamfer, left
+    margins = gear.tip_height, gear.tip_land, gear.body_thickness, gear.tip_chamfer, left
     return *margins, *(2 * radius for radius in radii)
 
 
