@@ -8,6 +8,7 @@ from catalogue import TWO_PAIRS, gear_pair, kahraman_gear
 
 import jaxgear as jg
 from jaxgear.contact.kinematics import kinematics
+from jaxgear.geometry import outline
 from jaxgear.manufacture import (
     allowance_of_balls,
     allowance_of_span,
@@ -17,6 +18,7 @@ from jaxgear.manufacture import (
     span,
     teeth_spanned,
 )
+from jaxgear.metrics.stress import single_contact_factors
 
 GEARS = {
     "plain": jg.Gear(20, 3.0, face_width=20.0),
@@ -130,3 +132,58 @@ def test_anvils_and_balls_that_miss_the_involute_are_refused():
         over_balls(gear, 40.0)
     with pytest.raises(ValueError, match=r"measured = 200 mm makes the tooth .* mm thicker, must be within 8.86 mm"):
         allowance_of_balls(gear, 5.1, 200.0)
+
+
+FZG_C = [  # teeth, profile shift, tip diameter; printed: x_E, root diameter, Y_F, Y_S
+    ((16, 0.1818, 82.45), (0.1559, 60.893, 2.087, 1.758)),
+    ((24, 0.1714, 118.35), (0.1454, 96.799, 1.866, 1.856)),
+]
+
+
+def fzg_c(allowance=-85.0, **options):
+    return [
+        jg.Gear(z, 4.5, 20.0, x, face_width=14.0, dedendum=1.39, root_radius=0.25, tip_diameter=tip,
+                tooth_thickness_allowance=allowance, **options)
+        for (z, x, tip), _ in FZG_C
+    ]  # fmt: skip
+
+
+def test_a_thinner_tooth_is_cut_deeper():
+    """A listing of the FZG gears C; the tooth is that of a gear with profile shift x_E and the same tip circle."""
+    gears = fzg_c()
+    for gear, factors, ((*_, tip), printed) in zip(gears, single_contact_factors(jg.GearPair(*gears, 91.5)), FZG_C):
+        shift = gear.generating_profile_shift
+        found = [float(each) for each in (shift, 2 * gear.root_circle_radius, factors.form, factors.correction)]
+        np.testing.assert_allclose(found, printed, atol=5.1e-4)
+        assert float(2 * gear.tip_radius) == tip
+        cut = jg.Gear(gear.teeth, 4.5, 20.0, shift, face_width=14.0, dedendum=1.39, root_radius=0.25, tip_diameter=tip)
+        np.testing.assert_allclose(outline(gear).curves[:7], outline(cut).curves[:7], rtol=1e-12)
+        np.testing.assert_allclose(
+            [outline(gear).form_roll_length, outline(gear).junction_height],
+            [outline(cut).form_roll_length, outline(cut).junction_height],
+            rtol=1e-12,
+        )
+
+
+def test_the_basic_rack_factor_counts_the_dedendum_that_is_cut():
+    stiffness = jg.sizing.iso_stiffness(jg.GearPair(*fzg_c(material=jg.Material(210_000.0)), 91.5))
+    assert [float(stiffness.single), float(stiffness.mesh)] == pytest.approx([11.5, 15.2], abs=0.05)
+
+
+def test_the_root_moves_with_the_allowance_of_traced_gears():
+    """dr_f / dE = 1 / (2 tan(alpha_n)), also through the span of a drawing of a helical gear."""
+    alpha = np.deg2rad(20.0)
+
+    def root(allowance):
+        return jg.Gear(20, 3.0, face_width=20.0, tooth_thickness_allowance=allowance).root_circle_radius
+
+    def drawn(length):
+        return jg.manufacture.drawn_gear(
+            teeth=17, module=8.0, profile_shift=0.14522, helix_angle=15.8, face_width=100.0, tip_diameter=159.66,
+            dedendum=1.4, root_radius=0.39, span=length, teeth_spanned=2,
+        ).root_circle_radius  # fmt: skip
+
+    assert float(jax.grad(root)(-50.0)) == pytest.approx(1e-3 / (2 * np.tan(alpha)), rel=1e-12)
+    value, slope = jax.value_and_grad(drawn)(38.196)
+    assert float(2 * value) == pytest.approx(120.825, abs=5e-4)
+    assert float(slope) == pytest.approx(1 / (2 * np.sin(alpha)), rel=1e-9)

@@ -57,7 +57,7 @@ def _iso_stiffness(pair: GearPair, line_load: Scalar) -> IsoStiffness:
     z2, x2 = (jnp.where(more, own, other) for own, other in zip(of_pinion, of_wheel))
     c1, c2, c3, c4, c5, c6, c7, c8, c9 = _Q
     q = c1 + c2 / z1 + c3 / z2 + c4 * x1 + c5 * x1 / z1 + c6 * x2 + c7 * x2 / z2 + c8 * x1**2 + c9 * x2**2
-    dedendum = 0.5 * (pinion.dedendum + wheel.dedendum)
+    dedendum = 0.5 * (_tooth_dedendum(pinion) + _tooth_dedendum(wheel))
     rack = (1 + 0.5 * (1.2 - dedendum)) * (1 - 0.02 * (20.0 - pinion.pressure_angle))
     first, second = pinion.material.elastic_modulus, wheel.material.elastic_modulus
     steel = 2 * first * second / (first + second) / 206_000.0
@@ -65,6 +65,11 @@ def _iso_stiffness(pair: GearPair, line_load: Scalar) -> IsoStiffness:
     blank = 0.5 * (_blank_factor(pinion) + _blank_factor(wheel))
     single = _MODEL_FACTOR * blank * rack * steel * light / q * pinion.helix_cosine
     return IsoStiffness(1 / q, single, single * (0.75 * path_of_contact(pair).contact_ratio + 0.25))
+
+
+def _tooth_dedendum(gear: Gear) -> Scalar:
+    """Coefficient of the dedendum as cut, h_fP + x - x_E, of the basic rack factor C_B."""
+    return gear.dedendum + gear.profile_shift - gear.generating_profile_shift
 
 
 def _blank_factor(gear: Gear) -> Scalar:

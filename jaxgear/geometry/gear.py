@@ -59,9 +59,8 @@ class Gear(Checked):
             corner contact only.
         tooth_thickness_allowance: E_sns, upper allowance of the tooth thickness (ISO 21771), by which the tooth is
             thicker than the rack makes it, as an arc on the reference cylinder, normal to the tooth [um]: negative for
-            backlash, half of it on either flank. Both flanks are turned towards the tooth centreline with their
-            fillets, as by a tool with wider teeth at the same depth: the root circle stays, and the thinner tooth is
-            softer.
+            backlash, half of it on either flank. The tool is fed deeper for it: root circle and fillet are those of
+            `generating_profile_shift`, and the thinner tooth is softer. The tip circle is that of the profile shift.
         tooth_thickness_tolerance: T_sn, from the upper down to the lower allowance E_sni = E_sns - T_sn [um]; the tooth
             is that in the middle of both.
         material: elastic constants.
@@ -190,7 +189,12 @@ class Gear(Checked):
     @property
     def mean_tooth_thickness_allowance(self) -> Real:
         """Middle of upper and lower allowance, (E_sns + E_sni) / 2 [um]: that of the tooth that is analysed."""
-        return self.tooth_thickness_allowance - 0.5 * self.tooth_thickness_tolerance
+        return _mean_allowance(self)
+
+    @property
+    def generating_profile_shift(self) -> Real:
+        """x_E = x + A_sn / (2 m_n tan(alpha_n)), at which the tool cuts the mean tooth thickness (ISO 21771)."""
+        return _generating_profile_shift(self)
 
     @property
     def thickness_angle(self) -> Real:
@@ -242,7 +246,17 @@ def _rack_tip_radius(gear: Gear) -> Any:  # likewise
 
 
 def _root_circle_radius(gear: Gear) -> Any:  # likewise
-    return 0.5 * _transverse_module(gear) * gear.teeth + gear.module * (gear.profile_shift - gear.dedendum)
+    return 0.5 * _transverse_module(gear) * gear.teeth + gear.module * (_generating_profile_shift(gear) - gear.dedendum)
+
+
+def _mean_allowance(gear: Gear) -> Any:  # likewise
+    return gear.tooth_thickness_allowance - 0.5 * gear.tooth_thickness_tolerance
+
+
+def _generating_profile_shift(gear: Gear) -> Any:  # likewise
+    of = np if isinstance(gear.module, np.ndarray) else jnp
+    deeper = 1e-3 * _mean_allowance(gear) / (2 * gear.module * of.tan(of.deg2rad(gear.pressure_angle)))
+    return gear.profile_shift + deeper
 
 
 def with_diameters(gear: Gear) -> Gear:

@@ -143,8 +143,8 @@ def rack_tip(gear: Gear) -> tuple[Scalar, Scalar, Scalar]:
     alpha, m = jnp.deg2rad(gear.pressure_angle), gear.module
     tip, pitch = gear.root_radius * m, jnp.pi * m
     from_rack_centre = pitch / 4 - gear.dedendum * m * jnp.tan(alpha) - (1 - jnp.sin(alpha)) * tip / jnp.cos(alpha)
-    from_centreline = (pitch / 2 - from_rack_centre) / gear.helix_cosine + gear.pitch_radius * gear.thickness_angle
-    return from_centreline, (gear.dedendum - gear.profile_shift) * m - tip, tip
+    from_centreline = (pitch / 2 - from_rack_centre) / gear.helix_cosine
+    return from_centreline, (gear.dedendum - gear.generating_profile_shift) * m - tip, tip
 
 
 def trochoid(gear: Gear, g: Real) -> tuple[Real, Real]:
@@ -160,7 +160,7 @@ def involute_point(gear: Gear, rho: Real) -> tuple[Real, Real]:
 def _tangential_form_roll_length(gear: Gear) -> Scalar:
     """Roll length of the junction at g = pressure angle [mm]; negative where the tooth is undercut (ISO 21771, d_Ff)."""
     alpha, rounded = gear.transverse_pressure_angle, 1 - jnp.sin(jnp.deg2rad(gear.pressure_angle))
-    straight = gear.dedendum - gear.profile_shift - gear.root_radius * rounded
+    straight = gear.dedendum - gear.generating_profile_shift - gear.root_radius * rounded
     return gear.pitch_radius * jnp.sin(alpha) - straight * gear.module / jnp.sin(alpha)
 
 

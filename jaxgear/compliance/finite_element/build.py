@@ -11,7 +11,7 @@ from .sectors import Places, along_edge, responses
 from .shape import Shape, Tooth
 
 # of everything here that the numbers depend on: files of another version are made anew
-VERSION = 1
+VERSION = 2
 POINTS = 25  # of every table: twice as many change nothing above 1e-5
 NEIGHBOURS = 7  # teeth whose coupling is kept; further ones feel the common wind-up alone
 # Half width of the elliptic pressure under which the local term is read, in modules: two edges of the mesh, and as the

@@ -58,13 +58,14 @@ class Tooth:
         self._alpha = alpha = np.deg2rad(shape.pressure_angle)
         self.pitch = 0.5 * shape.teeth
         self.base = self.pitch * np.cos(alpha)
-        self.root = self.pitch + shape.profile_shift - shape.dedendum
+        self._shift = shape.profile_shift + 0.5 * shape.allowance / np.tan(alpha)  # x_E of `Gear`
+        self.root = self.pitch + self._shift - shape.dedendum
         self.tip, self.bore = shape.tip_ratio, shape.bore_ratio
-        turn = (np.pi / 2 + 2 * shape.profile_shift * np.tan(alpha) + shape.allowance) / shape.teeth
+        turn = (np.pi / 2 + 2 * self._shift * np.tan(alpha)) / shape.teeth
         self._base_half_angle = turn + np.tan(alpha) - alpha
         arc = shape.root_radius
         land = np.pi / 4 - shape.dedendum * np.tan(alpha) - (1 - np.sin(alpha)) * arc / np.cos(alpha)
-        self._offset, self._depth = np.pi / 2 - land + shape.allowance / 2, shape.dedendum - shape.profile_shift - arc
+        self._offset, self._depth = np.pi / 2 - land, shape.dedendum - self._shift - arc
         self.tip_roll_length = float(np.sqrt(max(self.tip**2 - self.base**2, 0.0)))
         self.junction, self.form_roll_length = self._junction()
         end = self.trochoid(np.pi / 2)
@@ -110,7 +111,7 @@ class Tooth:
     def _junction(self) -> tuple[float, float]:
         """Where fillet and involute meet: parameter [rad] and roll length."""
         alpha = self._alpha
-        straight = self.shape.dedendum - self.shape.profile_shift - self.shape.root_radius * (1 - np.sin(alpha))
+        straight = self.shape.dedendum - self._shift - self.shape.root_radius * (1 - np.sin(alpha))
         tangential = self.pitch * np.sin(alpha) - straight / np.sin(alpha)
         if tangential > -1e-12 * self.pitch:
             return float(alpha), max(float(tangential), 0.0)
