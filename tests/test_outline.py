@@ -132,7 +132,9 @@ def test_the_tip_circle_of_the_rack_is_that_of_the_normal_section(printed):
 
     r, m, cosine = (float(each) for each in (helical.pitch_radius, helical.module, helical.helix_cosine))
     alpha, height, rho = np.deg2rad(20.0), HELICAL[printed]["dedendum"] * m, HELICAL[printed]["root_radius"] * m
-    centre = np.pi * m / 4 + height * np.tan(alpha) + rho * (1 - np.sin(alpha)) / np.cos(alpha)  # off the tooth's middle
+    centre = (
+        np.pi * m / 4 + height * np.tan(alpha) + rho * (1 - np.sin(alpha)) / np.cos(alpha)
+    )  # off the tooth's middle
     depth = height - float(helical.profile_shift) * m - rho
     x, y = (np.asarray(each)[:, None] for each in trochoid(helical, jnp.linspace(tooth.junction, jnp.pi / 2, 9)))
     turn = np.linspace(-0.1, 0.4, 20_001)
