@@ -44,6 +44,7 @@ def refused(make, *expected):
         ({"tip_diameter": -60.0}, ("Gear: tip_diameter = -60 mm", "greater than 0 mm")),
         ({"rim_thickness": 5.0}, ("Gear: web_thickness: missing", "rim_thickness needs it")),
         ({"rim_thickness": 500.0, "web_thickness": 5.0}, ("Gear: rim_thickness = 500 mm", "must be at most")),
+        ({"tip_edge_radius": 1.2}, ("Gear: tip_edge_radius = 1.2 mm", "at most 1.042 mm", "half the tip land")),
         ({"tip_edge_radius": 0.0}, ("Gear: tip_edge_radius = 0 mm", "greater than 0 mm")),
     ],
 )
@@ -67,6 +68,15 @@ def test_pointed_tooth():
     refused(lambda: gear(12, shift=0.9), "Gear: addendum", "tip diameter = 47.4 mm", "pointed", "tip land", "0 mm")
     refused(lambda: gear(30, tip_diameter=105.0), "Gear: tip_diameter", "105 mm", "pointed")
     gear(12, shift=0.9, tip_diameter=45.5)
+
+
+def test_a_default_tip_edge_gives_way_to_a_narrow_tip_land():
+    """0.05 modules, or half the tip land; of a chamfered tip the room is where the chamfer begins."""
+    assert float(gear().edge_radius) == pytest.approx(0.15) and "tip_edge_radius=0.15 mm (0.05 modules)" in str(gear())
+    narrow = gear(12, shift=0.9, tip_diameter=46.0)
+    assert float(narrow.edge_radius) == pytest.approx(0.5 * float(narrow.tip_land), rel=1e-12) < 0.15
+    assert "(half the tip land)" in str(narrow)
+    gear(12, shift=0.9, tip_diameter=46.0, tip_form_diameter=45.9, tip_edge_radius=float(narrow.edge_radius) + 0.01)
 
 
 def test_tip_inside_the_base_circle():

@@ -139,6 +139,16 @@ def test_pressure_at_the_pitch_point_is_hertz(cycle):
     assert pressure == pytest.approx(700.0, abs=40.0)
 
 
+@pytest.mark.parametrize("module", [0.2, 25.0])
+def test_corner_pressure_is_the_same_at_every_size(cycle, module):
+    """Of one pair scaled with its tip edges, under the torque that keeps the pressure of its flanks."""
+    scale = module / 3.0
+    pair = gear_pair(module=module, face_width=18.0 * scale, bores=(24.0 * scale, 70.0 * scale))
+    scaled = jg.solve(jg.prepare(pair, compliance=jg.default_compliance("strain"), resolution=LINE), 50.0 * scale**3)
+    for name in ("max_flank_pressure", "max_corner_pressure"):
+        assert float(quantities[name](scaled)) == pytest.approx(float(quantities[name](cycle)), rel=1e-9)
+
+
 def test_largest_contact_pressure_is_that_of_the_tip_edge_where_corners_touch(cycle, mesh):
     largest = {name: float(quantities[f"max_{name}_pressure"](cycle)) for name in ("flank", "corner", "contact")}
     assert largest["corner"] > largest["flank"] > 0

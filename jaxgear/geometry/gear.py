@@ -24,8 +24,12 @@ _RACK_HEIGHTS = 0.5, 2.0
 # The wind-up of the ring grows with the square of root over bore diameter: below this share of the root diameter no
 # bore passes a torque on that the teeth could carry, and the number is a slip.
 _LEAST_BORE = 0.02
+# of tip edges without a radius [modules]
+_USUAL_EDGE, _LEAST_EDGE = 0.05, 1e-3
 # by how much the tip form circle may lie outside the tip circle [mm], which a drawing rounds
 CHAMFER_ACCURACY = 1e-3
+# by how much, relative, a tip edge may be rounder than the tooth is thick: to half the tip land with four digits
+_EDGE_ACCURACY = 1e-3
 
 
 class Gear(Checked):
@@ -56,7 +60,8 @@ class Gear(Checked):
             None for a flank up to the tip diameter. The path of contact ends there, corner contact is with the edge
             there, and tip reliefs count from it. Chamfers have 45 degrees and must leave some of the tip land.
         tip_edge_radius: radius of the edge between flank and tip cylinder or chamfer [mm], used for the pressure of
-            corner contact only.
+            corner contact only; None for 0.05 modules. It is at most half the thickness of the tooth where the active
+            flank ends: the default gives way to it, which `str` prints.
         tooth_thickness_allowance: E_sns, upper allowance of the tooth thickness (ISO 21771), by which the tooth is
             thicker than the rack makes it, as an arc on the reference cylinder, normal to the tooth [um]: negative for
             backlash, half of it on either flank. The tool is fed deeper for it: root circle and fillet are those of
@@ -88,7 +93,7 @@ class Gear(Checked):
     bore_diameter: Scalar | None = number("mm", low=0.0, open_low=True, optional=True, default=None, kw_only=True)
     rim_thickness: Scalar | None = number("mm", low=0.0, open_low=True, optional=True, default=None, kw_only=True)
     web_thickness: Scalar | None = number("mm", low=0.0, open_low=True, optional=True, default=None, kw_only=True)
-    tip_edge_radius: Scalar = number("mm", low=0.0, open_low=True, default=0.1, kw_only=True)
+    tip_edge_radius: Scalar | None = number("mm", low=0.0, open_low=True, optional=True, default=None, kw_only=True)
     tooth_thickness_allowance: Scalar = number("um", high=0.0, default=0.0, kw_only=True)
     tooth_thickness_tolerance: Scalar = number("um", low=0.0, default=0.0, kw_only=True)
     material: Material = eqx.field(default_factory=Material, kw_only=True)
@@ -116,6 +121,10 @@ class Gear(Checked):
             known = concrete(2 * radius)
             if known is not None and known.ndim == 0:
                 text = text.replace(f"{name}=None", f"{name}={float(known):.6g} mm ({meaning})")
+        edge, usual = concrete(self.edge_radius), concrete(_USUAL_EDGE * self.module)
+        if edge is not None and usual is not None and edge.ndim == 0:
+            meaning = f"{_USUAL_EDGE:g} modules" if edge == usual else "half the tip land"
+            text = text.replace("tip_edge_radius=None", f"tip_edge_radius={float(edge):.4g} mm ({meaning})")
         return text
 
     @property
@@ -223,6 +232,19 @@ class Gear(Checked):
         return 2 * self.tip_radius * half_tooth_angle(self, rho)
 
     @property
+    def tip_half_thickness(self) -> Real:
+        """Half the thickness of the tooth as an arc where the active flank ends [mm], the room for the tip edge."""
+        return self.tip_form_radius * half_tooth_angle(self, self.tip_roll_length)
+
+    @property
+    def edge_radius(self) -> Real:
+        """Radius of the tip edge [mm]: `tip_edge_radius`, or 0.05 modules and at most half the tip land."""
+        if self.tip_edge_radius is not None:
+            return self.tip_edge_radius
+        # the least one keeps the numbers of a traced, pointed tooth finite
+        return jnp.clip(self.tip_half_thickness, _LEAST_EDGE * self.module, _USUAL_EDGE * self.module)
+
+    @property
     def tip_height(self) -> Real:
         """Radial height of the tip above base and root circle [mm], the smaller of the two."""
         return self.tip_radius - jnp.maximum(self.base_radius, self.root_circle_radius)
@@ -301,7 +323,7 @@ def shape_faults(gear: Gear) -> tuple[str, ...]:
     shape = _shape(with_diameters(gear))
     if any(isinstance(number, jax.core.Tracer) for number in shape):
         return ()
-    height, land, rim, chamfer, left, tip, form, base, root, bore = (float(number) for number in shape)
+    height, land, rim, chamfer, left, room, tip, form, base, root, bore = (float(number) for number in shape)
     name = "addendum" if gear.tip_diameter is None else "tip_diameter"
     faults = []
     if not height > 0:
@@ -320,6 +342,9 @@ def shape_faults(gear: Gear) -> tuple[str, ...]:
             f"Gear: tip_form_diameter = {form:.6g} mm leaves no tip land: chamfers of 45 degrees are there "
             f"{chamfer:.4g} mm high and meet below the tip diameter, {tip:.6g} mm"
         )
+    edge = 0.0 if gear.tip_edge_radius is None else float(gear.tip_edge_radius)
+    if land > 0 and height > 0 and room > 0 and edge > room * (1 + _EDGE_ACCURACY):
+        faults.append(f"Gear: tip_edge_radius = {edge:g} mm must be at most {room:.4g} mm, half the tip land")
     if not rim > 0:
         faults.append(f"Gear: bore_diameter = {bore:g} mm must be less than {root:g} mm")
     elif bore < _LEAST_BORE * root:
@@ -335,7 +360,7 @@ def _shape(gear: Gear) -> tuple[Scalar, ...]:
     angle = half_tooth_angle(gear, gear.tip_roll_length)
     left = gear.tip_form_radius * (jnp.sin(angle) + jnp.cos(angle)) - gear.tip_radius
     radii = (gear.tip_radius, gear.tip_form_radius, gear.base_radius, gear.root_circle_radius, gear.bore_radius)
-    margins = gear.tip_height, gear.tip_land, gear.body_thickness, gear.tip_chamfer, left
+    margins = gear.tip_height, gear.tip_land, gear.body_thickness, gear.tip_chamfer, left, gear.tip_half_thickness
     return *margins, *(2 * radius for radius in radii)
 
 

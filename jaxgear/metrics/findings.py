@@ -230,7 +230,7 @@ def _numbers(cycle: MeshCycle):
             ("elastic modulus", where, gear.material.elastic_modulus),
             ("density", where, gear.material.density),
             ("bore to root diameter", where, gear.bore_radius / gear.root_circle_radius),
-            ("tip edge radius in modules", where, gear.tip_edge_radius / gear.module),
+            ("tip edge radius in modules", where, gear.edge_radius / gear.module),
         ]
     module, stress = pair.pinion.module, nominal_root_stress(cycle)
     in_stress = cycle.kinematics.plane == "stress"
