@@ -304,6 +304,26 @@ def test_classes_of_the_gears_are_those_of_tolerance_and_charts(load):
     assert design.tables["tolerance"].quality_class == [6, 7]
 
 
+def test_diameters_of_a_drawing_make_the_rack(load):
+    """Root and root form diameter of the thinned tooth, also of a helical gear, and a chamfer of the module."""
+    for options in ({}, {"helix_angle": 20.0}):
+        tip = 2 * gear(**options).tip_radius - 0.6
+        wanted = gear(dedendum=1.2, root_radius=0.3, tooth_thickness_allowance=-90.0, tip_form_diameter=tip, **options)
+        form = jg.geometry.diameter(wanted, outline(wanted).form_roll_length)
+        given = {"root_diameter": 2 * wanted.root_circle_radius, "root_form_diameter": form, "tip_chamfer": 0.1}
+        found = drawn_gear(**PINION, **given, tooth_thickness_allowance=-90.0, **options)
+        for name in ("dedendum", "root_radius", "tip_form_diameter"):
+            assert float(getattr(found, name)) == pytest.approx(float(getattr(wanted, name)), rel=1e-9), name
+    roll, slope = jax.value_and_grad(lambda d: outline(drawn_gear(**PINION, root_form_diameter=d)).form_roll_length)(
+        54.0
+    )
+    assert float(slope * roll) == pytest.approx(54.0 / 4, rel=1e-9)
+
+    drawn = load("root_diameter = 50.0\ntip_chamfer = 0.1\ntooth_thickness_allowance = -60.0").pair().pinion
+    assert float(2 * drawn.root_circle_radius) == pytest.approx(50.0, rel=1e-12)
+    assert float(drawn.tip_chamfer) == pytest.approx(0.3, rel=1e-12)
+
+
 SPAN = "span = 23.0\nteeth_spanned = 3"
 REFUSED = {
     "two measures": (SPAN + "\nover_balls = 64.0\nball_diameter = 5.5", "", "pinion.over_balls: cannot stand beside"),
@@ -311,6 +331,18 @@ REFUSED = {
         SPAN + "\ntooth_thickness_allowance = -60.0",
         "",
         "pinion.tooth_thickness_allowance: cannot stand beside span: either says how thick",
+    ),
+    "two roots": ("root_diameter = 50.0\ndedendum = 1.3", "", "pinion.root_diameter: cannot stand beside dedendum"),
+    "no rack so deep": (
+        "root_diameter = 40.0",
+        "",
+        "pinion.root_diameter: dedendum = 2.93333 x module must be at least",
+    ),
+    "a rounding too large": ("root_form_diameter = 57.0", "", "pinion.root_form_diameter: root_radius = "),
+    "a root that backlash would move": (
+        "root_diameter = 50.0",
+        "[pair]\nbacklash = 100.0",
+        "pair.backlash: would thin the pinion, whose root_diameter is that of the thin tooth",
     ),
     "no teeth": ("span = 23.0", "", "pinion.teeth_spanned: missing, span needs it"),
     "no span": ("teeth_spanned = 3", "", "pinion.teeth_spanned: has no effect without span"),

@@ -4,8 +4,8 @@ Of helical gears it is that of the transverse section. The basic rack is that of
 one it is 1 / cos(beta) times as long along its pitch line, which makes an ellipse of the circle at its tip.
 
 Tooth frame: origin in the gear centre, y along the tooth centreline, x to the side. The trochoid is the envelope of the
-rack's tip, in the parameter g, the inclination of the common normal, which runs through the pitch point: g = pi/2 on the
-root circle, g = pressure angle where a tooth without undercut passes into the involute.
+rack's tip, in the parameter g, the inclination of the common normal, which runs through the pitch point: g = pi/2 on
+the root circle, g = pressure angle where a tooth without undercut passes into the involute.
 """
 
 from typing import NamedTuple
@@ -158,7 +158,7 @@ def involute_point(gear: Gear, rho: Real) -> tuple[Real, Real]:
 
 
 def _tangential_form_roll_length(gear: Gear) -> Scalar:
-    """Roll length of the junction at g = pressure angle [mm]; negative where the tooth is undercut (ISO 21771, d_Ff)."""
+    """Roll length of the junction at g = pressure angle [mm], of d_Ff in ISO 21771; negative in undercut."""
     alpha, rounded = gear.transverse_pressure_angle, 1 - jnp.sin(jnp.deg2rad(gear.pressure_angle))
     straight = gear.dedendum - gear.generating_profile_shift - gear.root_radius * rounded
     return gear.pitch_radius * jnp.sin(alpha) - straight * gear.module / jnp.sin(alpha)

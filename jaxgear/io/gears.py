@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from ..geometry import Gear, GearPair, Material, pair_with_backlash
-from ..manufacture import ToothThickness, drawn_gear
+from ..manufacture import ToothProfile, ToothThickness, drawn_gear
 from ..microgeometry import AbstractModification
 from ..numerics import Number, changed, fields_of
 from ..numerics import real as real_number
@@ -31,6 +31,7 @@ _LONGEST: Mapping[str, Callable[[tuple[float, float]], float]] = {
 _WITHOUT_FLANKS = "modification", "coast_modification", "quality_class"
 
 _ThicknessKeys = section_of(ToothThickness, most=(("teeth_spanned", 1000),))
+_ProfileKeys = section_of(ToothProfile)
 _GearKeys = section_of(Gear, ("material", "tooth_thickness_allowance"))
 
 _BACKLASH = Number("um", low=0.0)
@@ -45,12 +46,13 @@ def _modification(key: str, value: Any) -> Part | FlankFileSection:
     return described(AbstractModification).read(key, given)
 
 
-class GearSection(_ThicknessKeys, _GearKeys):  # type: ignore[misc, valid-type]
+class GearSection(_ProfileKeys, _ThicknessKeys, _GearKeys):  # type: ignore[misc, valid-type]
     """A gear and the modifications of its flanks.
 
     The tooth thickness is given in one of three ways: as the allowance E_sns, with the tolerance T_sn down to E_sni
     where there is one; as the span W_k over so many teeth; as the dimension over balls. A list of two is lower and
-    upper limit, between which the tooth is in the middle.
+    upper limit, between which the tooth is in the middle. Diameters of root and root form and the height of a chamfer
+    may stand in place of the coefficients of the rack and of the tip form diameter.
 
     Attributes:
         helix_angle: beta on the reference cylinder, positive for a right hand; a spur gear without it. Module, pressure
@@ -138,12 +140,12 @@ def fixed_gear(section: GearSection, materials: Materials) -> Gear:
 
 def gear_part(section: GearSection, materials: Materials) -> Part:
     """A gear without its modifications."""
-    gear, measures = part_of(section, Gear, without=("material",)), part_of(section, ToothThickness)
+    gear = part_of(section, Gear, without=("material",))
+    drawn = {**part_of(section, ToothThickness).fields, **part_of(section, ToothProfile).fields}
     if section.material is not None:
         gear = gear.having(material=_material(f"{section.at}.material", section.material, materials))
-    gear = gear.having(**measures.fields)
     # without any measure of a drawing the gear is the library's: messages then name its own fields
-    return replace(gear, make=drawn_gear if set(gear.fields) & set(fields_of(ToothThickness)) else Gear)
+    return replace(gear.having(**drawn), make=drawn_gear if drawn else Gear)
 
 
 def _material(key: str, given: str | Part, materials: Materials) -> Part:
@@ -177,6 +179,10 @@ def pair_of(section: PairSection, pinion: Part, wheel: Part) -> Part:
     if not open_gears and section.center_distance is not None:
         problem = "has no effect, centre distance and tooth thickness of both gears are given"
         raise DesignFileError("pair.backlash", problem)
+    for name in open_gears:
+        if cut := {"root_diameter", "root_form_diameter"} & set(pair.fields[name].fields):
+            problem = f"would thin the {name}, whose {min(cut)} is that of the thin tooth: give its tooth thickness"
+            raise DesignFileError("pair.backlash", problem)
     by = {0: "center_distance", 1: open_gears[-1] if open_gears else "", 2: "both"}[len(open_gears)]
     return replace(pair.having(backlash=as_field(section.backlash, _BACKLASH), by=by), make=pair_with_backlash)
 

@@ -1,8 +1,8 @@
 """How flanks are made and measured: form-grinding wheel, volumes ground off, charts of the measuring machine.
 
-`drawn_gear` makes a gear from the tooth thickness on its drawing. Functions of flanks take one gear's side of the
-contact, of `mesh.sides`, and the modification. The quantities `pinion_quadratic_deviation`, `pinion_removed_volume` and
-others are in the vocabulary.
+`drawn_gear` makes a gear from the tooth thickness and the diameters on its drawing. Functions of flanks take one gear's
+side of the contact, of `mesh.sides`, and the modification. The quantities `pinion_quadratic_deviation`,
+`pinion_removed_volume` and others are in the vocabulary.
 """
 
 from .chart import FlankDeviations as FlankDeviations
@@ -16,11 +16,13 @@ from .chart import profile_range as profile_range
 from .chart import profile_trace as profile_trace
 from .chart import start_of_relief as start_of_relief
 from .chart import table_traces as table_traces
+from .drawn_gear import drawn_gear as drawn_gear
+from .drawn_profile import ToothProfile as ToothProfile
+from .drawn_profile import with_profile as with_profile
 from .tooth_thickness import Measures as Measures
 from .tooth_thickness import ToothThickness as ToothThickness
 from .tooth_thickness import allowance_of_balls as allowance_of_balls
 from .tooth_thickness import allowance_of_span as allowance_of_span
-from .tooth_thickness import drawn_gear as drawn_gear
 from .tooth_thickness import measures as measures
 from .tooth_thickness import over_balls as over_balls
 from .tooth_thickness import span as span

@@ -14,7 +14,7 @@ from jaxtyping import Array, Float
 
 from ..geometry import Gear, outline
 from ..geometry.involute import involute
-from ..numerics import Checked, Given, Numbers, bracketed_root, check, concrete, count, fields_of, number, real, whole
+from ..numerics import Checked, Given, Numbers, bracketed_root, check, concrete, count, number, real, whole
 
 Scalar = Float[Array, ""]
 
@@ -251,7 +251,7 @@ Limits = Float[Array, "..."]  # one number, or lower and upper limit
 # By how much a tooth may come out thicker than without allowance [um]: a drawing rounds its lengths to a micrometre,
 # which is up to half of that on a span and less over balls.
 _ROUNDED = 1.0
-_WAYS = "span", "over_balls", "tooth_thickness_allowance"
+WAYS = "span", "over_balls", "tooth_thickness_allowance"
 _BESIDE = {"span": "teeth_spanned", "over_balls": "ball_diameter"}  # what a measure needs
 
 
@@ -279,14 +279,14 @@ class ToothThickness(Checked):
     tooth_thickness_allowance: Limits | None = number("um", high=0.0, limits=True, optional=True, default=None)
 
     def check_together(self) -> None:
-        given = [name for name in _WAYS if getattr(self, name) is not None]
+        given = [name for name in WAYS if getattr(self, name) is not None]
         for other, name in _BESIDE.items():
             if getattr(self, name) is not None and other not in given:
                 raise ValueError(f"ToothThickness: {name}: has no effect without {other}")
             if other in given and getattr(self, name) is None:
                 raise ValueError(f"ToothThickness: {name}: missing, {other} needs it")
         if not given:
-            raise ValueError(f"ToothThickness: {_WAYS[0]}: missing, give one of {', '.join(_WAYS)}")
+            raise ValueError(f"ToothThickness: {WAYS[0]}: missing, give one of {', '.join(WAYS)}")
         if len(given) > 1:
             problem = f"cannot stand beside {given[0]}: either says how thick the tooth is"
             raise ValueError(f"ToothThickness: {given[1]}: {problem}")
@@ -309,24 +309,6 @@ class ToothThickness(Checked):
             return _named("over_balls", lambda: _rounded(over, *of), ball_diameter=ball)
         assert self.tooth_thickness_allowance is not None
         return self.tooth_thickness_allowance
-
-
-def drawn_gear(**given: Any) -> Gear:
-    """A gear with what its drawing says: the arguments of `Gear` and those of `ToothThickness`.
-
-    Raises:
-        ValueError: for what either of them refuses, and for a `tooth_thickness_tolerance` beside lower and upper limit.
-    """
-    thickness = {name: given.pop(name) for name in fields_of(ToothThickness) if given.get(name) is not None}
-    if not thickness:
-        return Gear(**given)
-    says = ToothThickness(**thickness)
-    if given.get("tooth_thickness_tolerance") is not None:
-        which = next(name for name in _WAYS if name in thickness)
-        if which != "tooth_thickness_allowance" or np.ndim(thickness[which]):
-            raise ValueError(f"Gear: tooth_thickness_tolerance: has no effect, give lower and upper limit of {which}")
-        return Gear(**given, **thickness)
-    return with_thickness(Gear(**given), says)
 
 
 def with_thickness(gear: Gear, thickness: ToothThickness) -> Gear:

@@ -1,0 +1,73 @@
+"""Tip and root of a tooth as drawings give them: by diameters and heights, where a rack has coefficients."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from ..geometry import Gear, outline
+from ..numerics import Checked, concrete, number, safe_sqrt
+
+Scalar = Float[Array, ""]
+
+# what each says in place of a field of `Gear`
+REPLACED = {"root_diameter": "dedendum", "root_form_diameter": "root_radius", "tip_chamfer": "tip_form_diameter"}
+
+
+class ToothProfile(Checked):
+    """Tip and root of a tooth on its drawing; None for what the drawing does not give.
+
+    Attributes:
+        root_diameter: root diameter d_f [mm] of the tooth with its mean thickness, in place of `dedendum`.
+        root_form_diameter: root form diameter d_Ff [mm] of that tooth, in place of `root_radius`; of a tooth without
+            undercut.
+        tip_chamfer: radial height h_K of the tip's chamfer or rounding, coefficient of the module, in place of
+            `tip_form_diameter`.
+    """
+
+    root_diameter: Scalar | None = number("mm", low=0.0, open_low=True, optional=True, default=None)
+    root_form_diameter: Scalar | None = number("mm", low=0.0, open_low=True, optional=True, default=None)
+    tip_chamfer: Scalar | None = number("x module", low=0.0, optional=True, default=None)
+
+
+def with_profile(gear: Gear, profile: ToothProfile) -> Gear:
+    """The gear with tip and root of a drawing in place of its own.
+
+    Equations: d_f = d - 2 m_n (h_fP - x_E); d_Ff as in `outline`, with 1 - sin(alpha_n) times rho_fP (ISO 21771);
+        d_Fa = d_a - 2 h_K.
+
+    Raises:
+        ValueError: for what no rack makes, naming the key of the drawing and the coefficient.
+    """
+    if (chamfer := profile.tip_chamfer) is not None:
+        form = 2 * (gear.tip_radius - chamfer * gear.module)
+        gear = _named("tip_chamfer", lambda: replace(gear, tip_form_diameter=form))
+    if (root := profile.root_diameter) is not None:
+        dedendum = gear.generating_profile_shift + (gear.pitch_radius - 0.5 * root) / gear.module
+        if profile.root_form_diameter is not None:  # the rounding of the gear is not that of the drawing
+            gear = replace(gear, root_radius=jnp.zeros_like(gear.module))
+        gear = _named("root_diameter", lambda: replace(gear, dedendum=dedendum))
+    if profile.root_form_diameter is not None:
+        radius = _root_radius(gear, profile.root_form_diameter)
+        gear = _named("root_form_diameter", lambda: replace(gear, root_radius=radius))
+        if (undercut := concrete(outline(gear).undercut)) is not None and undercut.any():
+            raise ValueError("ToothProfile: root_form_diameter: the tooth is undercut, give root_radius")
+    return gear
+
+
+def _root_radius(gear: Gear, form_diameter: Scalar) -> Scalar:
+    """rho_fP of a root form diameter [mm], coefficient of the module."""
+    sine = jnp.sin(gear.transverse_pressure_angle)
+    roll = safe_sqrt((0.5 * form_diameter) ** 2 - gear.base_radius**2)
+    straight = (gear.pitch_radius * sine - roll) * sine / gear.module
+    depth = gear.dedendum - gear.generating_profile_shift
+    return (depth - straight) / (1 - jnp.sin(jnp.deg2rad(gear.pressure_angle)))
+
+
+def _named(name: str, made: Callable[[], Any]) -> Any:
+    try:
+        return made()
+    except ValueError as error:
+        raise ValueError(f"ToothProfile: {name}: {str(error).partition(': ')[2]}") from error
