@@ -42,6 +42,11 @@ def refused(make, *expected):
         ({"root_radius": 0.6}, ("Gear: root_radius = 0.6 x module", "at most 0.47")),
         ({"root_radius": -0.1}, ("Gear: root_radius = -0.1 x module", "at least 0 x module")),
         ({"tip_diameter": -60.0}, ("Gear: tip_diameter = -60 mm", "greater than 0 mm")),
+        ({"grinding_allowance": 50.0}, ("Gear: protuberance: missing", "grinding_allowance needs it")),
+        (
+            {"grinding_allowance": 100.0, "protuberance": 0.02},
+            ("Gear: grinding_allowance = 100 um", "at most 60 um, the protuberance"),
+        ),
         ({"rim_thickness": 5.0}, ("Gear: web_thickness: missing", "rim_thickness needs it")),
         ({"rim_thickness": 500.0, "web_thickness": 5.0}, ("Gear: rim_thickness = 500 mm", "must be at most")),
         ({"tip_edge_radius": 1.2}, ("Gear: tip_edge_radius = 1.2 mm", "at most 1.042 mm", "half the tip land")),

@@ -141,3 +141,66 @@ def test_the_tip_circle_of_the_rack_is_that_of_the_normal_section(printed):
     along = x * np.cos(turn) - y * np.sin(turn) - (centre / cosine - r * turn)
     above = x * np.sin(turn) + y * np.cos(turn) - (r - depth)
     np.testing.assert_allclose((np.hypot(along * cosine, above) / rho).min(axis=1), 1.0, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("teeth", "helix", "protuberance", "stock"),
+    [(25, None, 0.06, 100.0), (25, 20.0, 0.06, 100.0), (14, None, 0.03, 0.0)],
+)
+def test_a_protuberance_clears_the_root_for_grinding(teeth, helix, protuberance, stock):
+    """The tool, rolled along, touches the whole fillet from outside and leaves the stock on the flank above it."""
+    m, alpha, rack, shift = 3.0, np.deg2rad(20.0), (1.4, 0.3), 0.1
+    ground = jg.Gear(
+        teeth, m, 20.0, shift, face_width=20.0, helix_angle=helix, dedendum=rack[0], root_radius=rack[1],
+        protuberance=protuberance, grinding_allowance=stock,
+    )  # fmt: skip
+    tooth, cosine, r = outline(ground), float(ground.helix_cosine), float(ground.pitch_radius)
+    fed = shift * m + 1e-3 * stock / np.sin(alpha)
+    lean, rho, pr = alpha / 2, rack[1] * m, protuberance * m
+    across = (
+        np.pi * m / 4 - rack[0] * m * np.tan(alpha) + pr / np.cos(alpha) - rho * (1 - np.sin(alpha)) / np.cos(alpha)
+    )
+    depth = rack[0] * m - fed - rho
+
+    def half_width(y):
+        """Of the tool in the normal section, at a depth below the pitch line; it ends at its tip."""
+        end = depth + rho * np.sin(lean)
+        straight = across + rho * np.cos(lean) + (end - y) * np.tan(lean)
+        arc = across + np.sqrt(np.maximum(rho**2 - (y - depth) ** 2, 0.0))
+        tool = np.where(y < end, np.maximum(np.pi * m / 4 - (y + fed) * np.tan(alpha), straight), arc)
+        return np.where(y > depth + rho + 1e-9, -np.inf, tool)
+
+    def gap(points):
+        """Least distance to the tool along its pitch line in any position."""
+        x, y = (np.asarray(each)[:, None] for each in points)
+        turn = np.linspace(-0.6, 0.6, 120_001)
+        beside = (np.pi * m / (2 * cosine) - r * turn - (x * np.cos(turn) - y * np.sin(turn))) * cosine
+        return (beside - half_width(r - (x * np.sin(turn) + y * np.cos(turn)))).min(axis=1)
+
+    fillet = jnp.linspace(tooth.junction, jnp.pi / 2 - 0.05, 9)
+    np.testing.assert_allclose(gap(trochoid(ground, fillet)), 0.0, atol=2e-4)
+    assert float(jnp.hypot(*trochoid(ground, jnp.asarray(jnp.pi / 2)))) == pytest.approx(
+        r + fed - rack[0] * m, rel=1e-12
+    )
+    form = tooth.form_roll_length
+    np.testing.assert_allclose(trochoid(ground, tooth.junction), involute_point(ground, form), rtol=1e-7)
+    left = gap(involute_point(ground, jnp.linspace(form + 1e-3, ground.tip_roll_length - 1e-3, 9)))
+    assert (left > -2e-4).all()
+    np.testing.assert_allclose(left[-3:], 1e-3 * stock / np.cos(alpha), atol=2e-4)
+    plain = outline(jg.Gear(teeth, m, 20.0, shift, face_width=20.0, helix_angle=helix, dedendum=1.4, root_radius=0.3))
+    assert form > plain.form_roll_length
+
+
+def test_derivatives_by_protuberance_and_grinding_allowance():
+    def numbers(x):
+        gear = jg.Gear(25.0, 3.0, 20.0, 0.1, face_width=20.0, protuberance=x[0], grinding_allowance=1e3 * x[1])
+        tooth = outline(gear)
+        return jnp.stack([tooth.form_roll_length, tooth.root_half_angle, tooth.junction_height])
+
+    x, h = jnp.asarray([0.06, 0.1]), 1e-6
+    slopes, steps = jax.jit(
+        lambda x: (jax.jacfwd(numbers)(x), [(numbers(x + h * e) - numbers(x - h * e)) / (2 * h) for e in jnp.eye(2)])
+    )(x)
+    np.testing.assert_allclose(slopes.T, steps, rtol=1e-5, atol=1e-9)
+    equal = jax.jit(jax.grad(lambda pr: numbers(jnp.stack([pr, 0.18]))[0]))(0.06)
+    assert np.isfinite(equal)

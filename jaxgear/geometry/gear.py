@@ -28,8 +28,8 @@ _LEAST_BORE = 0.02
 _USUAL_EDGE, _LEAST_EDGE = 0.05, 1e-3
 # by how much the tip form circle may lie outside the tip circle [mm], which a drawing rounds
 CHAMFER_ACCURACY = 1e-3
-# by how much, relative, a tip edge may be rounder than the tooth is thick: to half the tip land with four digits
-_EDGE_ACCURACY = 1e-3
+# by how much, relative, a number that is given with four digits may be beyond the one that limits it
+_ROUNDED = 1e-3
 
 
 class Gear(Checked):
@@ -47,6 +47,12 @@ class Gear(Checked):
         helix_angle: beta on the reference cylinder, positive for a right hand [deg]; None, or 0, for a spur gear. Where
             it is traced, the mesh is that of a helical pair whatever its value.
         addendum, dedendum, root_radius: coefficients h_aP, h_fP and rho_fP of the basic rack, in modules (ISO 53).
+        protuberance: pr, by which the tool protrudes from its flanks at its tip, normal to them, coefficient of the
+            module; None for a tool without. The flank of the protuberance is inclined by half the pressure angle. It
+            takes `protuberance` less the grinding allowance off the root of the finished tooth, and d_Ff is where the
+            fillet runs out.
+        grinding_allowance: q, left on either flank for grinding, normal to it [um]; None for flanks that the tool
+            finishes. The tool is then fed less deep, and the root is not ground: the protuberance must be larger.
         tip_diameter: tip diameter d_a [mm]; None for m (z / cos(beta) + 2 x + 2 addendum).
         bore_diameter: diameter at which the body is rigidly fixed [mm]; None for half the root diameter, which `str`
             prints. For an integral shaft give the shaft's diameter beside the gear. The body is a plane ring: without a
@@ -88,6 +94,8 @@ class Gear(Checked):
     addendum: Scalar = number("x module", low=_RACK_HEIGHTS[0], high=_RACK_HEIGHTS[1], default=1.0, kw_only=True)
     dedendum: Scalar = number("x module", low=_RACK_HEIGHTS[0], high=_RACK_HEIGHTS[1], default=1.25, kw_only=True)
     root_radius: Scalar = number("x module", low=0.0, default=0.38, kw_only=True)
+    protuberance: Scalar | None = number("x module", low=0.0, high=0.2, optional=True, default=None, kw_only=True)
+    grinding_allowance: Scalar | None = number("um", low=0.0, optional=True, default=None, kw_only=True)
     tip_diameter: Scalar | None = number("mm", low=0.0, open_low=True, optional=True, default=None, kw_only=True)
     tip_form_diameter: Scalar | None = number("mm", low=0.0, open_low=True, optional=True, default=None, kw_only=True)
     bore_diameter: Scalar | None = number("mm", low=0.0, open_low=True, optional=True, default=None, kw_only=True)
@@ -102,6 +110,13 @@ class Gear(Checked):
         if self.helix_angle is not None and self.is_spur:
             object.__setattr__(self, "helix_angle", None)  # programs tell spur gears by it, where numbers are traced
         check("Gear", "root_radius", self.root_radius, "x module", low=0.0, high=_rack_radius_limit(self))
+        if self.grinding_allowance is not None:
+            if self.protuberance is None:
+                raise ValueError("Gear: protuberance: missing, grinding_allowance needs it")
+            stock, room = concrete(self.grinding_allowance), concrete(1e3 * self.protuberance * self.module)
+            if stock is not None and room is not None and (stock > room * (1 + _ROUNDED)).any():
+                least = f"{float(stock.max()):g} um must be at most {float(room.min()):.4g} um, the protuberance"
+                raise ValueError(f"Gear: grinding_allowance = {least}: a ground flank would end in a notch")
         for name, other in (("rim_thickness", "web_thickness"), ("web_thickness", "rim_thickness")):
             if getattr(self, name) is None and getattr(self, other) is not None:
                 raise ValueError(f"Gear: {name}: missing, {other} needs it")
@@ -202,7 +217,10 @@ class Gear(Checked):
 
     @property
     def generating_profile_shift(self) -> Real:
-        """x_E = x + A_sn / (2 m_n tan(alpha_n)), at which the tool cuts the mean tooth thickness (ISO 21771)."""
+        """x_E = x + A_sn / (2 m_n tan(alpha_n)) + q / (m_n sin(alpha_n)), at which the tool cuts (ISO 21771).
+
+        A_sn is the mean tooth thickness allowance and q the grinding allowance.
+        """
         return _generating_profile_shift(self)
 
     @property
@@ -278,7 +296,10 @@ def _mean_allowance(gear: Gear) -> Any:  # likewise
 def _generating_profile_shift(gear: Gear) -> Any:  # likewise
     of = np if isinstance(gear.module, np.ndarray) else jnp
     deeper = 1e-3 * _mean_allowance(gear) / (2 * gear.module * of.tan(of.deg2rad(gear.pressure_angle)))
-    return gear.profile_shift + deeper
+    shift = gear.profile_shift + deeper
+    if gear.grinding_allowance is None:
+        return shift
+    return shift + 1e-3 * gear.grinding_allowance / (gear.module * of.sin(of.deg2rad(gear.pressure_angle)))
 
 
 def with_diameters(gear: Gear) -> Gear:
@@ -343,7 +364,7 @@ def shape_faults(gear: Gear) -> tuple[str, ...]:
             f"{chamfer:.4g} mm high and meet below the tip diameter, {tip:.6g} mm"
         )
     edge = 0.0 if gear.tip_edge_radius is None else float(gear.tip_edge_radius)
-    if land > 0 and height > 0 and room > 0 and edge > room * (1 + _EDGE_ACCURACY):
+    if land > 0 and height > 0 and room > 0 and edge > room * (1 + _ROUNDED):
         faults.append(f"Gear: tip_edge_radius = {edge:g} mm must be at most {room:.4g} mm, half the tip land")
     if not rim > 0:
         faults.append(f"Gear: bore_diameter = {bore:g} mm must be less than {root:g} mm")

@@ -5,7 +5,9 @@ one it is 1 / cos(beta) times as long along its pitch line, which makes an ellip
 
 Tooth frame: origin in the gear centre, y along the tooth centreline, x to the side. The trochoid is the envelope of the
 rack's tip, in the parameter g, the inclination of the common normal, which runs through the pitch point: g = pi/2 on
-the root circle, g = pressure angle where a tooth without undercut passes into the involute.
+the root circle, g = pressure angle where a tooth without undercut passes into the involute. A protuberance of the tool
+cuts that involute off higher up. Its flank is where the tip arc ends; there the normal keeps its direction, and g below
+the inclination of that flank counts the way along it.
 """
 
 from typing import NamedTuple
@@ -21,6 +23,10 @@ from .involute import half_tooth_angle, involute
 Real = Float[Array, "..."]
 Scalar = Float[Array, ""]
 
+_LEAST_PROTUBERANCE = 1e-6  # beyond the grinding allowance [modules]
+# depth along the flank of a protuberance [modules per rad of the parameter], and the least parameter there [rad]
+_CLIMB, _ALONG_PROTUBERANCE = 10.0, 1e-3
+
 
 class Curves(NamedTuple):
     """The numbers that trochoid and involute of one gear are drawn by.
@@ -34,6 +40,8 @@ class Curves(NamedTuple):
         tip_roll_length: where the involute ends [mm].
         offset, depth, rounding: `rack_tip` [mm].
         stretch: 1 / cos(beta), length of the transverse rack over that of the normal one; None of a spur gear.
+        lean: inclination of the flank of the tool's protuberance [rad]; None without protuberance.
+        climb: depth along that flank over g [mm/rad]; likewise.
     """
 
     pitch_radius: Real
@@ -44,6 +52,8 @@ class Curves(NamedTuple):
     depth: Real
     rounding: Real
     stretch: Real | None = None
+    lean: Real | None = None
+    climb: Real | None = None
 
     def over(self, shape: tuple[int, ...]) -> "Curves":
         """The same numbers at every point of an array."""
@@ -51,12 +61,15 @@ class Curves(NamedTuple):
 
     def trochoid(self, g: Real) -> tuple[Real, Real]:
         """Point (x, y) [mm] of the fillet at the parameter g [rad]."""
-        r, along, rounding = self.pitch_radius, self.offset, self.rounding
+        r, along, depth, rounding = self.pitch_radius, self.offset, self.depth, self.rounding
+        if self.lean is not None and self.climb is not None:
+            up = self.climb * jnp.maximum(self.lean - g, 0.0)
+            along, depth, g = along - up * jnp.tan(self.lean), depth - up, jnp.maximum(g, self.lean)
         if self.stretch is not None:  # support point of the ellipse, with half axes of stretch x rounding and rounding
             rounding = rounding / jnp.sqrt((self.stretch * jnp.cos(g)) ** 2 + jnp.sin(g) ** 2)
             along = along - (self.stretch**2 - 1) * rounding * jnp.cos(g)
-        phi = (self.depth / jnp.tan(g) + along) / r
-        distance = self.depth / jnp.sin(g) + rounding
+        phi = (depth / jnp.tan(g) + along) / r
+        distance = depth / jnp.sin(g) + rounding
         return r * jnp.sin(phi) - distance * jnp.cos(g - phi), r * jnp.cos(phi) - distance * jnp.sin(g - phi)
 
     def half_angle(self, rho: Real) -> Real:
@@ -119,20 +132,31 @@ def outline(gear: Gear) -> Outline:
     tangential = _tangential_form_roll_length(gear)
     # at the limit of undercut both junctions lie on the base circle; rounding must not choose between them
     undercut = tangential < -8 * jnp.finfo(tangential.dtype).eps * gear.pitch_radius
-    cut = _undercut_junction(drawn, alpha)
-    junction = jnp.where(undercut, cut, alpha)
+    at_base = bracketed_root(_height_above_base, alpha, jnp.full_like(alpha, jnp.pi / 2), drawn)
+    if gear.protuberance is None:
+        cut = bracketed_root(_angle_outside_involute, alpha, at_base, drawn)
+    else:
+        highest, lowest = jnp.full_like(alpha, _ALONG_PROTUBERANCE), jnp.where(undercut, at_base, alpha)
+        cut = bracketed_root(_angle_outside_involute, highest, lowest, drawn)
     x, y = drawn.trochoid(cut)
-    rho_cut = jnp.sqrt(jnp.maximum(x**2 + y**2 - gear.base_radius**2, (1e-6 * gear.base_radius) ** 2))
-    form = jnp.where(undercut, rho_cut, jnp.maximum(tangential, 0.0))
+    form = jnp.sqrt(jnp.maximum(x**2 + y**2 - gear.base_radius**2, (1e-6 * gear.base_radius) ** 2))
+    if gear.protuberance is None:
+        cut = jnp.where(undercut, cut, alpha)
+        form = jnp.where(undercut, form, jnp.maximum(tangential, 0.0))
     normal = None if gear.helix_angle is None else outline(virtual_gear(gear))
-    return Outline(gear, drawn, junction, form, jnp.arctan2(end_x, end_y), undercut.astype(form.dtype), normal)
+    return Outline(gear, drawn, cut, form, jnp.arctan2(end_x, end_y), undercut.astype(form.dtype), normal)
 
 
 def curves(gear: Gear) -> Curves:
     """The numbers that the outline of a gear is drawn by."""
     at_base = half_tooth_angle(gear, jnp.zeros_like(gear.base_radius))
     stretch = None if gear.helix_angle is None else 1 / gear.helix_cosine
-    return Curves(gear.pitch_radius, gear.base_radius, at_base, gear.tip_roll_length, *rack_tip(gear), stretch)
+    lean, climb = None, None
+    if gear.protuberance is not None:
+        lean = jnp.arctan(jnp.tan(0.5 * jnp.deg2rad(gear.pressure_angle)) / gear.helix_cosine)
+        climb = _CLIMB * gear.module
+    drawn = rack_tip(gear)
+    return Curves(gear.pitch_radius, gear.base_radius, at_base, gear.tip_roll_length, *drawn, stretch, lean, climb)
 
 
 def rack_tip(gear: Gear) -> tuple[Scalar, Scalar, Scalar]:
@@ -143,6 +167,11 @@ def rack_tip(gear: Gear) -> tuple[Scalar, Scalar, Scalar]:
     alpha, m = jnp.deg2rad(gear.pressure_angle), gear.module
     tip, pitch = gear.root_radius * m, jnp.pi * m
     from_rack_centre = pitch / 4 - gear.dedendum * m * jnp.tan(alpha) - (1 - jnp.sin(alpha)) * tip / jnp.cos(alpha)
+    if gear.protuberance is not None:
+        allowance = 0.0 if gear.grinding_allowance is None else 1e-3 * gear.grinding_allowance
+        # where both are equal the flank is tangent to the fillet, and the derivative of their junction infinite
+        protruding = jnp.maximum(gear.protuberance * m, allowance + _LEAST_PROTUBERANCE * m)
+        from_rack_centre = from_rack_centre + protruding / jnp.cos(alpha)
     from_centreline = (pitch / 2 - from_rack_centre) / gear.helix_cosine
     return from_centreline, (gear.dedendum - gear.generating_profile_shift) * m - tip, tip
 
@@ -162,12 +191,6 @@ def _tangential_form_roll_length(gear: Gear) -> Scalar:
     alpha, rounded = gear.transverse_pressure_angle, 1 - jnp.sin(jnp.deg2rad(gear.pressure_angle))
     straight = gear.dedendum - gear.generating_profile_shift - gear.root_radius * rounded
     return gear.pitch_radius * jnp.sin(alpha) - straight * gear.module / jnp.sin(alpha)
-
-
-def _undercut_junction(drawn: Curves, alpha: Scalar) -> Scalar:
-    """Trochoid parameter where the fillet crosses the involute of an undercut tooth."""
-    at_base = bracketed_root(_height_above_base, alpha, jnp.full_like(alpha, jnp.pi / 2), drawn)
-    return bracketed_root(_angle_outside_involute, alpha, at_base, drawn)
 
 
 # functions of the module, not of a call: a root search compiles once for each function that it is given

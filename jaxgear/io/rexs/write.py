@@ -76,6 +76,9 @@ def write_rexs(
     if float(pair.axial_offset) != 0:
         problem = "must be 0 mm: a stage of REXS has no place for it"
         raise ValueError(f"write_rexs: axial_offset = {float(pair.axial_offset):g} mm {problem}")
+    for name, gear in zip(("pinion", "wheel"), pair.gears):
+        if gear.protuberance is not None:
+            raise ValueError(f"write_rexs: {name} protuberance: must be left out, it is not written yet")
     model = Model(_VERSION)
     title = "".join(letter for letter in title if letter.isprintable())
     unit = model.add("gear_unit", model_name=(title or None, "none"))
