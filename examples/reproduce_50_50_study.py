@@ -68,6 +68,7 @@ def prepare(fast=False) -> jg.Mesh:
         module=3.0,
         face_width=20.0,
         tip_diameter=154.5709,
+        tip_edge_radius=0.1,
         tooth_thickness_allowance=-72.0,
         material=jg.Material(elastic_modulus=207_000.0),
     )

@@ -39,7 +39,7 @@ def replaced(cycle, where, **values):
             gear = getattr(cycle.kinematics.pair, where)
             return getattr(gear if hasattr(gear, name) else gear.material, name)
 
-        cycle = eqx.tree_at(number, cycle, number(cycle) * 0 + value)
+        cycle = eqx.tree_at(number, cycle, jnp.asarray(value), is_leaf=lambda leaf: leaf is None)
     return cycle
 
 
