@@ -319,6 +319,12 @@ def test_diameters_of_a_drawing_make_the_rack(load):
     )
     assert float(slope * roll) == pytest.approx(54.0 / 4, rel=1e-9)
 
+    full = drawn_gear(**PINION, root_diameter=50.4, full_root_radius=True)
+    assert float(2 * full.root_circle_radius) == pytest.approx(50.4, rel=1e-12)
+    land = np.pi / 4 - float(full.dedendum) * np.tan(np.deg2rad(20.0))
+    assert float(full.root_radius) * (1 - np.sin(np.deg2rad(20.0))) / COSINE == pytest.approx(land, rel=1e-9)
+    assert float(load("full_root_radius = true").pair().pinion.root_radius) == pytest.approx(0.47191, abs=1e-5)
+
     drawn = load("root_diameter = 50.0\ntip_chamfer = 0.1\ntooth_thickness_allowance = -60.0").pair().pinion
     assert float(2 * drawn.root_circle_radius) == pytest.approx(50.0, rel=1e-12)
     assert float(drawn.tip_chamfer) == pytest.approx(0.3, rel=1e-12)
@@ -331,6 +337,11 @@ REFUSED = {
         SPAN + "\ntooth_thickness_allowance = -60.0",
         "",
         "pinion.tooth_thickness_allowance: cannot stand beside span: either says how thick",
+    ),
+    "two roundings": (
+        "full_root_radius = true\nroot_form_diameter = 54.0",
+        "",
+        "pinion.full_root_radius: cannot stand beside root_form_diameter",
     ),
     "two roots": ("root_diameter = 50.0\ndedendum = 1.3", "", "pinion.root_diameter: cannot stand beside dedendum"),
     "no rack so deep": (

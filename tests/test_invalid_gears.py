@@ -78,11 +78,11 @@ def test_pointed_tooth():
 def test_a_default_tip_edge_gives_way_to_a_narrow_tip_land():
     """0.05 modules, or half the tip land; of a chamfered tip the room is where the chamfer begins."""
     assert float(gear().edge_radius) == pytest.approx(0.15) and "tip_edge_radius=0.15 mm (0.05 modules)" in str(gear())
-    narrow = gear(12, shift=0.9, tip_diameter=46.0)
+    narrow = gear(12, shift=0.9, tip_diameter=47.0)
     assert float(narrow.edge_radius) < 0.15
     assert float(narrow.edge_radius) == pytest.approx(0.5 * float(narrow.tip_land), rel=1e-12)
     assert "(half the tip land)" in str(narrow)
-    gear(12, shift=0.9, tip_diameter=46.0, tip_form_diameter=45.9, tip_edge_radius=float(narrow.edge_radius) + 0.01)
+    gear(12, shift=0.9, tip_diameter=47.0, tip_form_diameter=46.9, tip_edge_radius=float(narrow.edge_radius) + 0.01)
 
 
 def test_tip_inside_the_base_circle():

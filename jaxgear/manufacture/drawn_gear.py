@@ -1,11 +1,11 @@
 """A gear as its drawing describes it."""
 
+from dataclasses import fields
 from typing import Any
 
 import numpy as np
 
 from ..geometry import Gear
-from ..numerics import fields_of
 from .drawn_profile import REPLACED, ToothProfile, with_profile
 from .tooth_thickness import WAYS, ToothThickness, with_thickness
 
@@ -19,7 +19,7 @@ def drawn_gear(**given: Any) -> Gear:
     """
     profile = _taken(given, ToothProfile)
     for name in profile:
-        if given.get(REPLACED[name]) is not None:
+        if profile[name] is not False and given.get(REPLACED[name]) is not None:
             raise ValueError(f"ToothProfile: {name}: cannot stand beside {REPLACED[name]}: either says the other")
     gear = _thick_gear(given)
     return with_profile(gear, ToothProfile(**profile)) if profile else gear
@@ -40,5 +40,5 @@ def _thick_gear(given: dict[str, Any]) -> Gear:
 
 def _taken(given: dict[str, Any], cls: type) -> dict[str, Any]:
     """Takes the fields of a class that are not None out of what is given."""
-    found = {name: given.pop(name, None) for name in fields_of(cls)}
+    found = {field.name: given.pop(field.name, None) for field in fields(cls)}
     return {name: value for name, value in found.items() if value is not None}

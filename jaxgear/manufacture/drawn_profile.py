@@ -13,7 +13,12 @@ from ..numerics import Checked, concrete, number, safe_sqrt
 Scalar = Float[Array, ""]
 
 # what each says in place of a field of `Gear`
-REPLACED = {"root_diameter": "dedendum", "root_form_diameter": "root_radius", "tip_chamfer": "tip_form_diameter"}
+REPLACED = {
+    "root_diameter": "dedendum",
+    "root_form_diameter": "root_radius",
+    "full_root_radius": "root_radius",
+    "tip_chamfer": "tip_form_diameter",
+}
 
 
 class ToothProfile(Checked):
@@ -23,13 +28,20 @@ class ToothProfile(Checked):
         root_diameter: root diameter d_f [mm] of the tooth with its mean thickness, in place of `dedendum`.
         root_form_diameter: root form diameter d_Ff [mm] of that tooth, in place of `root_radius`; of a tooth without
             undercut.
+        full_root_radius: True if one arc rounds the whole tip of the rack, in place of `root_radius`:
+            rho_fP = (pi / 4 - h_fP tan(alpha_n)) cos(alpha_n) / (1 - sin(alpha_n)).
         tip_chamfer: radial height h_K of the tip's chamfer or rounding, coefficient of the module, in place of
             `tip_form_diameter`.
     """
 
     root_diameter: Scalar | None = number("mm", low=0.0, open_low=True, optional=True, default=None)
     root_form_diameter: Scalar | None = number("mm", low=0.0, open_low=True, optional=True, default=None)
+    full_root_radius: bool = False
     tip_chamfer: Scalar | None = number("x module", low=0.0, optional=True, default=None)
+
+    def check_together(self) -> None:
+        if self.full_root_radius and self.root_form_diameter is not None:
+            raise ValueError("ToothProfile: full_root_radius: cannot stand beside root_form_diameter, which says it")
 
 
 def with_profile(gear: Gear, profile: ToothProfile) -> Gear:
@@ -46,9 +58,15 @@ def with_profile(gear: Gear, profile: ToothProfile) -> Gear:
         gear = _named("tip_chamfer", lambda: replace(gear, tip_form_diameter=form))
     if (root := profile.root_diameter) is not None:
         dedendum = gear.generating_profile_shift + (gear.pitch_radius - 0.5 * root) / gear.module
-        if profile.root_form_diameter is not None:  # the rounding of the gear is not that of the drawing
+        if (
+            profile.root_form_diameter is not None or profile.full_root_radius
+        ):  # the gear's rounding is not the drawing's
             gear = replace(gear, root_radius=jnp.zeros_like(gear.module))
         gear = _named("root_diameter", lambda: replace(gear, dedendum=dedendum))
+    if profile.full_root_radius:
+        alpha = jnp.deg2rad(gear.pressure_angle)
+        half_width = jnp.pi / 4 - gear.dedendum * jnp.tan(alpha)
+        gear = replace(gear, root_radius=half_width * jnp.cos(alpha) / (1 - jnp.sin(alpha)))
     if profile.root_form_diameter is not None:
         radius = _root_radius(gear, profile.root_form_diameter)
         gear = _named("root_form_diameter", lambda: replace(gear, root_radius=radius))
