@@ -145,7 +145,7 @@ def test_the_tip_circle_of_the_rack_is_that_of_the_normal_section(printed):
 
 @pytest.mark.parametrize(
     ("teeth", "helix", "protuberance", "stock"),
-    [(25, None, 0.06, 100.0), (25, 20.0, 0.06, 100.0), (14, None, 0.03, 0.0)],
+    [(25, 20.0, 0.06, 100.0), (14, None, 0.03, 0.0)],
 )
 def test_a_protuberance_clears_the_root_for_grinding(teeth, helix, protuberance, stock):
     """The tool, rolled along, touches the whole fillet from outside and leaves the stock on the flank above it."""
@@ -173,7 +173,7 @@ def test_a_protuberance_clears_the_root_for_grinding(teeth, helix, protuberance,
     def gap(points):
         """Least distance to the tool along its pitch line in any position."""
         x, y = (np.asarray(each)[:, None] for each in points)
-        turn = np.linspace(-0.6, 0.6, 120_001)
+        turn = np.linspace(-0.6, 0.6, 24_001)
         beside = (np.pi * m / (2 * cosine) - r * turn - (x * np.cos(turn) - y * np.sin(turn))) * cosine
         return (beside - half_width(r - (x * np.sin(turn) + y * np.cos(turn)))).min(axis=1)
 
@@ -191,6 +191,7 @@ def test_a_protuberance_clears_the_root_for_grinding(teeth, helix, protuberance,
     assert form > plain.form_roll_length
 
 
+@pytest.mark.slow
 def test_derivatives_by_protuberance_and_grinding_allowance():
     def numbers(x):
         gear = jg.Gear(25.0, 3.0, 20.0, 0.1, face_width=20.0, protuberance=x[0], grinding_allowance=1e3 * x[1])

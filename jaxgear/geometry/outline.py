@@ -13,6 +13,7 @@ the inclination of that flank counts the way along it.
 from typing import NamedTuple
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
@@ -57,7 +58,8 @@ class Curves(NamedTuple):
 
     def over(self, shape: tuple[int, ...]) -> "Curves":
         """The same numbers at every point of an array."""
-        return Curves(*(None if number is None else jnp.broadcast_to(number, shape) for number in self))
+        drawn: Curves = jax.tree.map(lambda number: jnp.broadcast_to(number, shape), self)
+        return drawn
 
     def trochoid(self, g: Real) -> tuple[Real, Real]:
         """Point (x, y) [mm] of the fillet at the parameter g [rad]."""
