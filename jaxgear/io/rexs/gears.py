@@ -252,7 +252,7 @@ def write_gear(
     settings = model.add(
         "cylindrical_gear_manufacturing_settings",
         f"{name} settings",
-        **{_GENERATED: (gear.profile_shift, "none")},
+        **{_GENERATED: (gear.generating_profile_shift, "none")},
     )
     flanks = [
         model.add(
