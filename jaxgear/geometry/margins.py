@@ -11,6 +11,7 @@ from jaxtyping import Array, Bool, Float
 
 from ..numerics import Checked, Given, result, safe_sqrt
 from .gear import CHAMFER_ACCURACY, Gear, shape_faults
+from .interference import fillet_clearance
 from .involute import diameter, involute
 from .outline import Outline, outline
 from .path import PathOfContact, backlash_free_involute, pressure_angle_of
@@ -46,10 +47,14 @@ class Margins(Checked):
         pinion_tip_height, wheel_tip_height: height of the tip above base and root circle [mm].
         pinion_rim_thickness, wheel_rim_thickness: from the bore to the root circle [mm].
         pinion_form_clearance, wheel_form_clearance: roll length at which the mate's tip meets the flank beyond that of
-            the form circle, where the usable involute starts [mm].
+            the form circle, where the usable involute starts [mm]. Below zero the path of contact begins at the form
+            circle, and the pair runs where the fillet is clear.
+        pinion_fillet_clearance, wheel_fillet_clearance: least arc between the fillet of the gear and the tip of the
+            mate [mm].
         pinion_tip_clearance, wheel_tip_clearance: from the gear's tip to the mate's root circle on the line of
             centres [mm].
-        contact_ratio_margin: transverse contact ratio minus 1.
+        contact_ratio_margin: transverse contact ratio minus 1. Helical gears run below 0 too, where the overlap ratio
+            makes up for it.
         backlash: play between the unloaded flanks on the line of action [um], by centre distance and tooth thickness
             allowances; without a given centre distance that of the allowances alone.
         base_circle_clearance: centre distance minus both base radii [mm].
@@ -58,6 +63,7 @@ class Margins(Checked):
             ones [rad]. No margin: it must vanish.
         tip_overrun: by how much a tip form circle lies outside its tip circle, the larger of both gears [mm]. No
             margin: it must not be positive, and is zero without chamfers.
+        overlap_ratio: of the faces.
         accuracy: by how much clearances of the form circles and backlash may lie below zero.
     """
 
@@ -69,6 +75,8 @@ class Margins(Checked):
     wheel_rim_thickness: Scalar = result("mm")
     pinion_form_clearance: Scalar = result("mm")
     wheel_form_clearance: Scalar = result("mm")
+    pinion_fillet_clearance: Scalar = result("mm")
+    wheel_fillet_clearance: Scalar = result("mm")
     pinion_tip_clearance: Scalar = result("mm")
     wheel_tip_clearance: Scalar = result("mm")
     contact_ratio_margin: Scalar = result("")
@@ -77,6 +85,7 @@ class Margins(Checked):
     face_overlap: Scalar = result("mm")
     base_pitch_difference: Scalar = eqx.field(repr=False)
     tip_overrun: Scalar = eqx.field(repr=False)
+    overlap_ratio: Scalar = eqx.field(repr=False)
     accuracy: Accuracy = eqx.field(repr=False)
 
     @property
@@ -93,9 +102,12 @@ class Margins(Checked):
             "base_circle_clearance": self.base_circle_clearance > 0,
             "backlash": self.backlash >= -self.accuracy.backlash,
             "face_overlap": self.face_overlap > 0,
-            "contact_ratio_margin": self.contact_ratio_margin >= 0,
-            "pinion_form_clearance": self.pinion_form_clearance >= -self.accuracy.pinion_form,
-            "wheel_form_clearance": self.wheel_form_clearance >= -self.accuracy.wheel_form,
+            "contact_ratio_margin": (self.contact_ratio_margin > -1)
+            & (self.contact_ratio_margin + jnp.maximum(self.overlap_ratio, 0.0) >= 0),
+            "pinion_form_clearance": (self.pinion_form_clearance >= -self.accuracy.pinion_form)
+            | (self.pinion_fillet_clearance >= -_OUTLINE_ACCURACY),
+            "wheel_form_clearance": (self.wheel_form_clearance >= -self.accuracy.wheel_form)
+            | (self.wheel_fillet_clearance >= -_OUTLINE_ACCURACY),
             "pinion_tip_clearance": self.pinion_tip_clearance >= -_OUTLINE_ACCURACY,
             "wheel_tip_clearance": self.wheel_tip_clearance >= -_OUTLINE_ACCURACY,
         }
@@ -115,6 +127,7 @@ def margins_between(
     tangent = path.pinion_pitch_roll_length / path.pinion_base_radius
     secant = jnp.sqrt(1 + tangent**2)
     distance = both * secant if center_distance is None else center_distance
+    pitch = path.pinion_pitch_roll_length, path.wheel_pitch_roll_length
     return Margins(
         pinion_tip_land=first.tip_land,
         wheel_tip_land=second.tip_land,
@@ -122,8 +135,10 @@ def margins_between(
         wheel_tip_height=second.tip_height,
         pinion_rim_thickness=first.rim_thickness,
         wheel_rim_thickness=second.rim_thickness,
-        pinion_form_clearance=path.pinion_roll_length(path.start) - pinion.form_roll_length,
-        wheel_form_clearance=path.wheel_roll_length(path.end) - wheel.form_roll_length,
+        pinion_form_clearance=path.pinion_roll_length(path.start) - path.start_shortened - pinion.form_roll_length,
+        wheel_form_clearance=path.wheel_roll_length(path.end) - path.end_shortened - wheel.form_roll_length,
+        pinion_fillet_clearance=fillet_clearance(pinion, second, *pitch, distance),
+        wheel_fillet_clearance=fillet_clearance(wheel, first, *pitch[::-1], distance),
         pinion_tip_clearance=distance - first.tip_radius - second.root_circle_radius,
         wheel_tip_clearance=distance - second.tip_radius - first.root_circle_radius,
         contact_ratio_margin=path.contact_ratio - 1,
@@ -131,6 +146,7 @@ def margins_between(
         base_circle_clearance=distance - both,
         face_overlap=face_overlap,
         base_pitch_difference=_apart(first, second),
+        overlap_ratio=face_overlap * jnp.abs(jnp.tan(first.base_helix_angle)) / first.base_pitch,
         tip_overrun=-jnp.minimum(first.tip_chamfer, second.tip_chamfer),
         accuracy=Accuracy(
             pinion_form=_form_accuracy(pinion),

@@ -8,7 +8,7 @@ from jaxtyping import Array, Bool, Float, PyTree
 from ..numerics import Checked, changed, concrete, number, on_both, program
 from .gear import Gear, with_diameters
 from .margins import Margins, faults_between, margins_between
-from .outline import outline
+from .outline import Outline, outline
 from .path import PathOfContact, path_between, working_pressure_angle
 
 Scalar = Float[Array, ""]
@@ -31,9 +31,8 @@ class GearPair(Checked):
 
     Raises:
         ValueError: for gears that do not share module or pressure angle, helical gears of the same hand, an impossible
-            centre distance, a contact ratio below 1, a tip that touches the mate's flank below its form circle or the
-            mate's root circle, faces that do not overlap: the first of what `explain` lists. Pairs made while being
-            traced pass; their `margins` tell.
+            centre distance, a total contact ratio below 1, a tip that hits the mate's fillet or root circle, faces that
+            do not overlap: the first of what `explain` lists. Pairs made while being traced pass; their `margins` tell.
     """
 
     pinion: Gear
@@ -168,16 +167,17 @@ class GearPair(Checked):
         return self.wheel.teeth / self.pinion.teeth
 
 
-def path_of_contact(pair: GearPair) -> PathOfContact:
-    """Path of contact of a pair, limited by the two tip circles."""
-    return path_between(pair.pinion, pair.wheel, pair.center_distance)
+def path_of_contact(pair: GearPair, outlines: tuple[Outline, Outline] | None = None) -> PathOfContact:
+    """Path of contact of a pair, limited by tip and form circles; `outlines` of its gears where they are known."""
+    forms = None if outlines is None else (outlines[0].form_roll_length, outlines[1].form_roll_length)
+    return path_between(pair.pinion, pair.wheel, pair.center_distance, forms)
 
 
 @program
 def margins(pair: GearPair) -> Margins:
     """How far a pair is from what cannot run; finite and differentiable for impossible gears too."""
     outlines = on_both(outline, pair.pinion, pair.wheel)
-    return margins_between(*outlines, path_of_contact(pair), pair.center_distance, pair.face_overlap)
+    return margins_between(*outlines, path_of_contact(pair, outlines), pair.center_distance, pair.face_overlap)
 
 
 def explain(pair: GearPair) -> tuple[str, ...]:
