@@ -7,10 +7,11 @@ from collections.abc import Mapping
 
 import equinox as eqx
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Bool, Float
 
 from ..numerics import Checked, Given, result, safe_sqrt
-from .gear import CHAMFER_ACCURACY, Gear, shape_faults
+from .gear import CHAMFER_ACCURACY, Gear, degrees_meant, shape_faults
 from .interference import fillet_clearance
 from .involute import diameter, involute
 from .outline import Outline, outline
@@ -22,6 +23,7 @@ Scalar = Float[Array, ""]
 _OUTLINE_ACCURACY = 1e-3
 # single precision resolves a centre distance to about 1e-7 of its value
 _DISTANCE_ACCURACY = 1e-6
+_LEAST_DECIMALS = 2  # that drawings give
 
 
 class Accuracy(eqx.Module):
@@ -241,17 +243,48 @@ def faults_between(
 
 def _backlash_fault(pinion: Gear, wheel: Gear, center_distance: Given | None) -> str:
     assert center_distance is not None  # that of None leaves no backlash to miss
-    both = pinion.base_radius + wheel.base_radius
-    angle = pressure_angle_of(backlash_free_involute(pinion, wheel) + 0.5e-3 * thickening(pinion, wheel) / both)
-    free = float(both / jnp.cos(angle)) * (1 - _DISTANCE_ACCURACY)
+    free = float(free_distance(pinion, wheel)) * (1 - _DISTANCE_ACCURACY)
     unit = "mm (backlash-free)"
     return f"GearPair: center_distance = {float(center_distance):g} {unit} must be at least {free:g} {unit}"
+
+
+def free_distance(pinion: Gear, wheel: Gear) -> Scalar:
+    """Centre distance without backlash [mm], of the mean tooth thicknesses."""
+    both = pinion.base_radius + wheel.base_radius
+    return both / jnp.cos(
+        pressure_angle_of(backlash_free_involute(pinion, wheel) + 0.5e-3 * thickening(pinion, wheel) / both)
+    )
+
+
+def rounded_by(pinion: Gear, wheel: Gear, center_distance: Given) -> float:
+    """Part of a concrete centre distance that the rounding of the given digits is worth [mm].
+
+    That of its own digits, and of those of both profile shifts and the helix angle: half a unit of the last one, of
+    numbers that are given to fewer than two decimals of the second.
+    """
+    angle = 0.0 if pinion.helix_angle is None else abs(float(pinion.helix_angle))
+    shifts = _half_unit(pinion.profile_shift) + _half_unit(wheel.profile_shift)
+    tilted = float(center_distance) * np.tan(np.deg2rad(angle)) * np.deg2rad(_half_unit(angle)) if angle else 0.0
+    return _half_unit(center_distance) + float(pinion.module) * shifts + float(tilted)
+
+
+def _half_unit(value: Given) -> float:
+    digits = np.format_float_positional(np.asarray(value)[()], trim="-").partition(".")[2]
+    return 0.5 * 10.0 ** -max(len(digits), _LEAST_DECIMALS)
 
 
 def _contact_ratio_fault(pinion: Gear, wheel: Gear, center_distance: Given | None, contact_ratio: float) -> str:
     remedy = "raise a tip_diameter or addendum"
     if center_distance is None:
         return f"GearPair: contact ratio = {contact_ratio:.4g} must be at least 1: {remedy}"
+    angle = degrees_meant(pinion)
+    if angle is not None:
+        closest = 0.5 * float(pinion.module) * float(pinion.teeth + wheel.teeth) / float(np.cos(np.deg2rad(angle)))
+        if abs(closest - float(center_distance)) < 2 * float(pinion.module):
+            return (
+                f"GearPair: pinion helix_angle = {np.deg2rad(angle):g} deg does not go with center_distance = "
+                f"{float(center_distance):g} mm: give degrees, {angle:.4g} deg?"
+            )
     given, reach = f"GearPair: center_distance = {float(center_distance):g} mm", pinion.tip_radius + wheel.tip_radius
     if not float(center_distance) < float(reach):
         return f"{given} must be less than {float(reach):g} mm, the sum of both tip radii: the teeth do not meet"

@@ -21,8 +21,8 @@ class PathOfContact(Checked):
     Attributes:
         start: A, tip of the wheel meets the root of the pinion; form circle of the pinion (d_Ff = d_Nf) where that tip
             would reach below it, as it does on undercut teeth.
-        inner_single: B, a preceding pair leaves contact at E.
-        outer_single: D, the following pair enters contact at A.
+        inner_single: B, a preceding pair leaves contact at E; A where the contact ratio is below 1.
+        outer_single: D, the following pair enters contact at A; E where the contact ratio is below 1.
         end: E, tip of the pinion leaves, or form circle of the wheel.
         base_pitch: of both gears.
         pinion_pitch_roll_length, wheel_pitch_roll_length: roll lengths of the two gears at C.
@@ -125,8 +125,8 @@ def path_between(
     start, end = start + start_shortened, end - end_shortened
     return PathOfContact(
         start=start,
-        inner_single=end - pinion.base_pitch,
-        outer_single=start + pinion.base_pitch,
+        inner_single=jnp.maximum(end - pinion.base_pitch, start),
+        outer_single=jnp.minimum(start + pinion.base_pitch, end),
         end=end,
         base_pitch=pinion.base_pitch,
         pinion_pitch_roll_length=pinion_pitch,
