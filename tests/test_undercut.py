@@ -35,9 +35,13 @@ def test_a_tip_that_hits_the_fillet_is_refused():
         jg.GearPair(*gears(root_radius=0.3, dedendum=1.0))
 
 
-def test_less_than_one_pair_in_contact_is_refused():
-    with pytest.raises(ValueError, match="contact ratio"):
+def test_less_than_one_pair_in_contact_is_refused_but_of_helical_gears_in_total():
+    with pytest.raises(ValueError, match="contact ratio = 0.897"):
         jg.GearPair(*gears(teeth=8, root_radius=0.3))
+    helical = [jg.Gear(z, 2.0, face_width=30.0, helix_angle=b) for z, b in ((8, 15.0), (9, -15.0))]
+    path = jg.path_of_contact(jg.GearPair(*helical))
+    assert 0.5 < float(path.contact_ratio) < 1
+    assert path.inner_single == path.start and path.outer_single == path.end
 
 
 @program
@@ -73,3 +77,16 @@ def test_the_edge_of_the_undercut_touches_the_mate_before_the_path_begins():
     np.testing.assert_allclose(found.corner_gap, gaps, atol=2e-3)
     np.testing.assert_allclose(found.pinion_roll_length, float(drawn.form_roll_length), rtol=1e-12)
     assert np.all(np.diff(found.wheel_roll_length) > 0) and np.all(np.asarray(found.beyond_tip) == 0)
+
+
+@pytest.mark.slow
+def test_an_undercut_pinion_under_load_touches_beyond_the_form_circle_with_its_edge():
+    """Contact goes on before the start, as it does with tip corners; nothing jumps there and the load is carried."""
+    mesh = jg.prepare(jg.GearPair(*gears(root_radius=0.3)), resolution=jg.Resolution(positions=32))
+    cycle = jg.solve(mesh, 5.0)
+    assert bool(cycle.converged.all()) and np.all(np.isfinite(cycle.transmission_error))
+    np.testing.assert_allclose(jnp.sum(cycle.pair_force, axis=0), cycle.force, rtol=1e-9)
+    before = np.asarray(mesh.path) < float(mesh.path_of_contact.start)
+    assert np.asarray(cycle.pair_force)[before].max() > 0.05 * float(cycle.force)
+    edge = np.asarray(cycle.corner_pressure)[:, 0][before]
+    assert edge.max() > 0 and np.all(np.asarray(cycle.contact_pressure)[:, 0][before] == 0)

@@ -29,7 +29,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Bool, Float
 
 from ..compliance import Plane
 from ..geometry import Gear, GearPair, Outline, PathOfContact, explicit, path_of_contact
@@ -208,7 +208,7 @@ class Kinematics(Checked):
 
     @property
     @over_batch
-    def wheel_edge(self) -> Field:
+    def wheel_edge(self) -> Bool[Array, "pairs *slices positions"]:
         """Whether an edge of the wheel touches the pinion outside the path of contact, and not one of the pinion.
 
         Ahead of the path that is the tip of the wheel, or, where the path begins at the form circle of the pinion, its
@@ -303,9 +303,9 @@ def contacts(pair: GearPair, contact: PathOfContact, path: Float[Array, "..."], 
         (contact.wheel_roll_length(contact.start), pair.wheel.tip_edge_radius),
         (contact.pinion_roll_length(contact.end), pair.pinion.tip_edge_radius),
     )
-    before, after = on_both(
-        lambda given: _corner(*given, REACH * contact.base_pitch), *zip(outside, at_form, (approach, recess), tips)
-    )
+    # the edge of an undercut passes the tip of the mate about as far outside the path as this is shortened
+    reaches = (REACH * contact.base_pitch + less for less in (contact.start_shortened, contact.end_shortened))
+    before, after = on_both(lambda given: _corner(*given), *zip(outside, at_form, (approach, recess), tips, reaches))
     on_path = jnp.clip(path, contact.start, contact.end)
     apart = 0.0 if extended else jnp.where(path == on_path, 0.0, 1e3 * contact.base_pitch)
     ahead, behind = (x > 0 for x in outside)

@@ -228,7 +228,9 @@ def faults_between(
             f"{reach:g} mm, half the sum of both face widths: the faces do not overlap"
         )
     if "contact_ratio_margin" in missed:
-        faults.append(_contact_ratio_fault(pinion, wheel, center_distance, float(margins.contact_ratio_margin) + 1))
+        transverse = float(margins.contact_ratio_margin) + 1
+        total = transverse + max(float(margins.overlap_ratio), 0.0) if transverse > 0 else transverse
+        faults.append(_contact_ratio_fault(pinion, wheel, center_distance, total))
     for name, mate, gear in (("pinion", "wheel", pinion), ("wheel", "pinion", wheel)):
         if f"{name}_form_clearance" in missed:
             faults.append(_form_fault(name, mate, gear, float(getattr(margins, f"{name}_form_clearance"))))
@@ -276,7 +278,7 @@ def _half_unit(value: Given) -> float:
 def _contact_ratio_fault(pinion: Gear, wheel: Gear, center_distance: Given | None, contact_ratio: float) -> str:
     remedy = "raise a tip_diameter or addendum"
     if center_distance is None:
-        return f"GearPair: contact ratio = {contact_ratio:.4g} must be at least 1: {remedy}"
+        return f"GearPair: {_ratio(pinion)} = {contact_ratio:.4g} must be at least 1: {remedy}"
     angle = degrees_meant(pinion)
     if angle is not None:
         closest = 0.5 * float(pinion.module) * float(pinion.teeth + wheel.teeth) / float(np.cos(np.deg2rad(angle)))
@@ -288,7 +290,11 @@ def _contact_ratio_fault(pinion: Gear, wheel: Gear, center_distance: Given | Non
     given, reach = f"GearPair: center_distance = {float(center_distance):g} mm", pinion.tip_radius + wheel.tip_radius
     if not float(center_distance) < float(reach):
         return f"{given} must be less than {float(reach):g} mm, the sum of both tip radii: the teeth do not meet"
-    return f"{given} leaves a contact ratio of {contact_ratio:.4g}, must be at least 1: lower it, or {remedy}"
+    return f"{given} leaves a {_ratio(pinion)} of {contact_ratio:.4g}, must be at least 1: lower it, or {remedy}"
+
+
+def _ratio(gear: Gear) -> str:
+    return "contact ratio" if gear.helix_angle is None else "total contact ratio"
 
 
 def _form_fault(name: str, mate: str, gear: Gear, clearance: float) -> str:

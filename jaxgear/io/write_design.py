@@ -76,9 +76,7 @@ curve = "parabolic"
 _HAND = "helix_angle = {angle!r}   # deg, positive for a right hand; the wheel has the other\n"
 _SPUR = "# helix_angle = 15.0            # deg, positive for a right hand; the wheel has the other\n"
 _RACK = "pressure_angle = {angle!r}         # deg\n"
-_FILLET = (
-    "root_radius = {radius:.4f}          # x module, c_P / (1 - sin(alpha)) of ISO 53\n"
-)
+_FILLET = "root_radius = {radius:.4f}          # x module, c_P / (1 - sin(alpha)) of ISO 53\n"
 _SHIFT = "profile_shift = {shift!r}          # x module\n"
 _NO_SHIFT = "# profile_shift = 0.0           # x module\n"
 _SPEED = "speed = {speed!r}                # rpm of the pinion\n"
