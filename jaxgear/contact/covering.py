@@ -93,7 +93,7 @@ def _next_gaps(pair: GearPair) -> tuple[Array, Float[Array, "counts 2"]]:
     start, end = contact.start - ahead, contact.end + ahead
     fewest = jnp.maximum(_covering(jnp.maximum(end, -start) / contact.base_pitch), float(_FEWEST_PAIRS))
     counts = fewest + jnp.arange(_MORE_PAIRS + 1, dtype=fewest.dtype)
-    nearest = reach(counts) * contact.base_pitch - ahead  # to the pitch point, of the ends of the next contact line
+    nearest = counts * reach(1) * contact.base_pitch - ahead  # to the pitch point, of the ends of the next contact line
     places = [jnp.minimum(-nearest, contact.start), jnp.maximum(nearest, contact.end)]
     return fewest, closing(contacts(pair, contact, jnp.stack(places, axis=1)))
 

@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 from math import gcd
-from typing import Any
 
 import equinox as eqx
 import numpy as np
@@ -205,6 +204,6 @@ def end_relief_widths(face_width: Given, length: Given, slices: int = 11) -> tup
     return made
 
 
-def reach(pairs: Any) -> Any:
+def reach(pairs: int) -> float:
     """Base pitches on either side of the pitch point that a number of pairs covers."""
     return 0.5 * pairs

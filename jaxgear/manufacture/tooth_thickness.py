@@ -246,7 +246,7 @@ def _check_near(owner: str, name: str, value: Array, nominal: Scalar, gear: Gear
         check(owner, name, value, "mm", low=float(middle - pitch), high=float(middle + pitch))
 
 
-def _check_spanned(gear: Gear, measured: Array, teeth: Scalar) -> None:
+def _check_spanned(gear: Gear, measured: Array, teeth: Given) -> None:
     """Refuses a span that is that of another number of teeth."""
     known = [concrete(each) for each in (measured, teeth, _span(_without_allowance(gear), teeth), gear.base_pitch)]
     if any(each is None for each in known):
