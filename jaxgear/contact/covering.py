@@ -169,8 +169,7 @@ def check_cover(pair: GearPair, contact: PathOfContact, resolution: Resolution) 
 def _path_over_face(pair: GearPair, contact: PathOfContact) -> tuple[float, float] | None:
     """Ends of the path of contact that a contact line runs over while any of it is on the face [base pitches]."""
     ahead = 0.0 if pair.is_spur else _half_overlap(pair)
-    known = [concrete(each) for each in (contact.start, contact.end, contact.base_pitch, ahead)]
-    if any(each is None for each in known):
+    start, end, pitch, more = map(concrete, (contact.start, contact.end, contact.base_pitch, ahead))
+    if start is None or end is None or pitch is None or more is None:
         return None
-    start, end, pitch, more = known
     return float(((start - more) / pitch).min()), float(((end + more) / pitch).max())

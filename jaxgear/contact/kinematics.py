@@ -322,7 +322,7 @@ def contacts(pair: GearPair, contact: PathOfContact, path: Float[Array, "..."], 
         ),
         before.gap + after.gap + apart,
         1 - 0.5e-3 * (before.slope + after.slope),
-        sum(jnp.where(form, 0.0, jnp.maximum(x, 0.0)) for form, x in zip(at_form, outside)),
+        jnp.add(*(jnp.where(form, 0.0, jnp.maximum(x, 0.0)) for form, x in zip(at_form, outside))),
     )
 
 

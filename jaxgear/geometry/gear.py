@@ -374,8 +374,7 @@ def _usual_root_radius(gear: Gear) -> Scalar:
 
 def has_full_radius(gear: Gear) -> bool:
     """Whether the fillet is known to be cut by the full radius of a rack that has no room for the usual one."""
-    known = [concrete(each) for each in (gear.root_radius, gear.pressure_angle, gear.dedendum)]
-    if any(each is None or each.ndim for each in known):
+    radius, alpha, dedendum = (concrete(each) for each in (gear.root_radius, gear.pressure_angle, gear.dedendum))
+    if radius is None or alpha is None or dedendum is None or radius.ndim:
         return False
-    radius, alpha, dedendum = known
     return bool(radius < _ROOT_RADIUS and abs(radius - _full_radius(alpha, dedendum)) < _RACK_ACCURACY)

@@ -4,6 +4,7 @@ One rule for each margin decides both: `Margins.held`. Concrete pairs are refuse
 """
 
 from collections.abc import Mapping
+from typing import Any
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -271,7 +272,8 @@ def rounded_by(pinion: Gear, wheel: Gear, center_distance: Given) -> float:
 
 
 def _half_unit(value: Given) -> float:
-    digits = np.format_float_positional(np.asarray(value)[()], trim="-").partition(".")[2]
+    known: Any = np.asarray(value)[()]  # in its own precision, whose shortest digits are those that were given
+    digits = np.format_float_positional(known, trim="-").partition(".")[2]
     return 0.5 * 10.0 ** -max(len(digits), _LEAST_DECIMALS)
 
 

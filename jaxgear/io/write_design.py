@@ -169,12 +169,12 @@ def starter_pair(
     Raises:
         ValueError: for gears that are not possible.
     """
-    fillet = {}
+    fillet = None
     if pressure_angle < _PRESSURE_ANGLE:
         # of ISO 53: c_P / (1 - sin(alpha)), so that the rack is straight down to the addendum of the mate
         radius = (_DEDENDUM - _ADDENDUM) / (1 - np.sin(np.deg2rad(pressure_angle)))
-        fillet = {"root_radius": real(np.floor(1e4 * radius) / 1e4)}
-    gears = (
+        fillet = real(np.floor(1e4 * radius) / 1e4)
+    pinion, wheel = (
         Gear(
             real(count),
             real(module),
@@ -182,11 +182,11 @@ def starter_pair(
             real(shift),
             face_width=real(face_width),
             helix_angle=real(hand),
-            **fillet,
+            root_radius=fillet,
         )
         for count, shift, hand in zip(teeth, profile_shift, (helix_angle, -helix_angle))
     )
-    return GearPair(*gears)
+    return GearPair(pinion, wheel)
 
 
 def write_design(
