@@ -169,7 +169,7 @@ def starter_pair(
     Raises:
         ValueError: for gears that are not possible.
     """
-    fillet = None
+    fillet: Any = None
     if pressure_angle < _PRESSURE_ANGLE:
         # of ISO 53: c_P / (1 - sin(alpha)), so that the rack is straight down to the addendum of the mate
         radius = (_DEDENDUM - _ADDENDUM) / (1 - np.sin(np.deg2rad(pressure_angle)))
