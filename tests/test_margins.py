@@ -23,7 +23,7 @@ IMPOSSIBLE = {
     "base_circle_clearance": (0.1, 0.0, 1.0, 93.0, 63.5, 24.0),
     "backlash": (0.4, 0.3, 1.0, 101.5, 63.5, 24.0),
     "contact_ratio_margin": (0.1, 0.0, 1.0, 104.5, 63.5, 24.0),
-    "pinion_form_clearance": (-0.5, 0.5, 1.0, 100.9, 59.0, 24.0),
+    "wheel_form_clearance": (-0.5, 0.5, 1.0, 100.9, 64.0, 24.0),
     "pinion_tip_clearance": (0.1, -0.6, 1.0, 100.5, 68.6, 24.0),
 }
 

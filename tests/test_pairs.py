@@ -11,6 +11,7 @@ from catalogue import gear_pair
 
 import jaxgear as jg
 from jaxgear.contact import removed_material
+from jaxgear.contact.covering import check_cover
 from jaxgear.contact.slide import as_removed
 from jaxgear.contact.solve import outermost
 from jaxgear.contact.status import Status
@@ -172,3 +173,18 @@ def test_the_default_gives_what_four_pairs_give(teeth, torque):
         assert bool(cycles.converged.all())
         results.append(cycles.transmission_error)
     np.testing.assert_allclose(*results, rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize("width, helix", [(60.0, 30.0), (80.0, 45.0), (24.0, 30.0)])
+def test_pairs_are_counted_by_the_contact_lines_on_the_face(width, helix):
+    """Overlap ratios of 1.9 to 9: as many as lie within the path of contact, to which the next ones come no nearer."""
+    pinion, wheel = (jg.Gear(z, 2.0, face_width=width, helix_angle=b) for z, b in ((24, helix), (50, -helix)))
+    pair = jg.GearPair(pinion, wheel)
+    path, half = jg.path_of_contact(pair), 0.5 * float(pair.overlap_ratio)
+    farthest = max(float(path.end), -float(path.start)) / float(path.base_pitch) + half
+    pairs = jg.contact.fewest_pairs(pair, deflection=1.0)
+    assert 2 * farthest <= pairs <= 2 * farthest + 2
+    assert jg.contact.fewest_pairs(pair, deflection=40.0) >= pairs
+    check_cover(pair, path, jg.Resolution(pairs=pairs))
+    with pytest.raises(ValueError, match="pairs = 2 must be at least"):
+        check_cover(pair, path, jg.Resolution(pairs=2))

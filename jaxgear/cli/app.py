@@ -84,6 +84,12 @@ def new(
     helix_angle: Annotated[
         float, typer.Option(metavar="DEG", help="Helix angle of the pinion in degrees, positive for a right hand.")
     ] = 0.0,
+    pressure_angle: Annotated[
+        float, typer.Option(metavar="DEG", help="Normal pressure angle of the basic rack in degrees.")
+    ] = 20.0,
+    profile_shift: Annotated[
+        tuple[float, float], typer.Option(metavar="X1 X2", help="Profile shifts of pinion and wheel in modules.")
+    ] = (0.0, 0.0),
 ) -> int:
     """Write a commented design file for a pair, which analyze and optimize take as it is.
 
@@ -91,7 +97,17 @@ def new(
     """
     with interrupt.importing():
         from .convert import new
-    new(file, teeth, module=module, torque=torque, face_width=face_width, speed=speed, helix_angle=helix_angle)
+    new(
+        file,
+        teeth,
+        module=module,
+        torque=torque,
+        face_width=face_width,
+        speed=speed,
+        helix_angle=helix_angle,
+        pressure_angle=pressure_angle,
+        profile_shift=profile_shift,
+    )
     return OK
 
 

@@ -73,7 +73,9 @@ def place_of(mesh: Mesh, torque: Scalar, line_load: Real | None = None) -> Place
         # arc length of the tip's involute over the path that is left out
         tip, base = side.tip_roll_length, side.base_radius
         over.append((2 * tip + outside) * outside / (2 * base))
-    beyond = jnp.where(path > contact.end, over[0], 0.0) - jnp.where(path < contact.start, over[1], 0.0)
+    # the edge of an undercut stays where the path of contact ends on its gear
+    tips = (path > contact.end) & (contact.end_shortened <= 0), (path < contact.start) & (contact.start_shortened <= 0)
+    beyond = jnp.where(tips[0], over[0], 0.0) - jnp.where(tips[1], over[1], 0.0)
     inside = [
         jnp.maximum(side.tip_roll_length**2 - side.contact_roll_length**2, 0.0) / (2 * side.base_radius)
         for side in (first, second)

@@ -1,6 +1,6 @@
 """How many tooth pairs a mesh has to carry along."""
 
-from collections.abc import Sequence
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -16,6 +16,9 @@ from .resolution import Resolution, reach
 # its load and shrink with its module, so that 8 um per mm are about 500 MPa; twice that leaves room for deep reliefs.
 _DEFLECTION = 16.0
 _PAIRS_TRACED = 4
+_FEWEST_PAIRS = 2
+# Pairs beyond those on the path of contact that a deflection may need: teeth that bend farther have broken.
+_MORE_PAIRS = 10
 # Slices of helical gears: for every base pitch that the face overlaps, and at least.
 _PER_PITCH, _FEWEST_SLICES = 10, 11
 
@@ -60,6 +63,8 @@ def _gaps_of_slices(pair: GearPair) -> Array:
 def fewest_pairs(pair: GearPair, *, deflection: float = 100.0) -> int:
     """The fewest pairs for `Resolution` that contain every contact up to a deflection; work grows with their square.
 
+    Those whose contact lines lie on the face within the path of contact, and as many more as touch beyond it.
+
     Args:
         pair: gear pair with concrete numbers.
         deflection: largest transmission error under load, beyond the unloaded one [um].
@@ -68,33 +73,34 @@ def fewest_pairs(pair: GearPair, *, deflection: float = 100.0) -> int:
         the number of pairs, at least 2.
 
     Raises:
-        ValueError: when more than 12 pairs would be needed.
+        ValueError: when more than 10 pairs beyond those on the path of contact would be needed.
     """
-    candidates = range(2, 13)
-    reaches = [reach(pairs) for pairs in candidates]
-    gaps = np.asarray(_gaps_at(pair, reaches))
-    for pairs, gap in zip(candidates, gaps):
-        if gap.min() > deflection:
-            return pairs
-    raise ValueError(
-        f"fewest_pairs: 12 pairs do not contain every contact up to deflection = {deflection:g} um: the torque is too "
-        "large for these teeth, or is it not in N m, or the elastic modulus not in MPa?"
-    )
+    fewest, gaps = (np.asarray(found) for found in _next_gaps(pair))
+    enough = np.flatnonzero(gaps.min(axis=1) > deflection)
+    if not enough.size:
+        raise ValueError(
+            f"fewest_pairs: {int(fewest) + _MORE_PAIRS} pairs do not contain every contact up to deflection = "
+            f"{deflection:g} um: the torque is too large for these teeth, or is it not in N m, or the elastic modulus "
+            "not in MPa?"
+        )
+    return int(fewest) + int(enough[0])
 
 
 @program
-def _gaps_at(pair: GearPair, reaches: Sequence[float]) -> Array:
-    contact = path_of_contact(pair)
-    return closing(_next_pairs(pair, contact, jnp.asarray(reaches, jnp.result_type(contact.start))))
+def _next_gaps(pair: GearPair) -> tuple[Array, Float[Array, "counts 2"]]:
+    """Pairs on the path of contact; gaps of the next ones behind and ahead with these, and with ever one more [um]."""
+    contact, ahead = path_of_contact(pair), _half_overlap(pair)
+    start, end = contact.start - ahead, contact.end + ahead
+    fewest = jnp.maximum(_covering(jnp.maximum(end, -start) / contact.base_pitch), float(_FEWEST_PAIRS))
+    counts = fewest + jnp.arange(_MORE_PAIRS + 1, dtype=fewest.dtype)
+    nearest = counts * reach(1) * contact.base_pitch - ahead  # to the pitch point, of the ends of the next contact line
+    places = [jnp.minimum(-nearest, contact.start), jnp.maximum(nearest, contact.end)]
+    return fewest, closing(contacts(pair, contact, jnp.stack(places, axis=1)))
 
 
-def _next_pairs(pair: GearPair, contact: PathOfContact, reach: Float[Array, " windows"]) -> Contacts:
-    """The first pairs behind and ahead of windows of so many base pitches either way, where they are nearest.
-
-    Of shape (windows, 2).
-    """
-    end = reach * contact.base_pitch - _half_overlap(pair)
-    return contacts(pair, contact, jnp.stack([-end, end], axis=1))
+def _covering(farthest: Any) -> Any:
+    """The fewest pairs that reach so many base pitches to either side of the pitch point, of Python or JAX."""
+    return -(-2 * farthest // 1)
 
 
 def _half_overlap(pair: GearPair) -> Float[Array, ""]:
@@ -133,21 +139,37 @@ def closing(points: Contacts) -> Float[Array, "..."]:
     return points.corner_gap / points.lever
 
 
+def may_take_more(pair: GearPair, contact: PathOfContact, resolution: Resolution) -> bool:
+    """Whether teeth that touch beyond the pairs of a resolution may be whole still, as far as it is known."""
+    fewest = pairs_on_path(pair, contact)
+    return fewest is not None and resolution.chosen_pairs < fewest + _MORE_PAIRS
+
+
+def pairs_on_path(pair: GearPair, contact: PathOfContact) -> int | None:
+    """The fewest pairs whose contact lines cover the path of contact over the face; None where that is not known."""
+    known = _path_over_face(pair, contact)
+    return None if known is None else max(int(_covering(max(known[1], -known[0]))), _FEWEST_PAIRS)
+
+
 def check_cover(pair: GearPair, contact: PathOfContact, resolution: Resolution) -> None:
     """Refuses a path of contact that the pairs of a resolution do not cover, as far as it is known.
 
     Raises:
         ValueError: naming the number of pairs that does.
     """
-    ahead_of_middle = 0.0 if pair.is_spur else _half_overlap(pair)
-    start, end, pitch, more = map(concrete, (contact.start, contact.end, contact.base_pitch, ahead_of_middle))
-    if start is None or end is None or pitch is None or more is None:
-        return
-    start, end = (start - more) / pitch, (end + more) / pitch
-    farthest = max(float(end.max()), float(-start.min()))
-    if farthest > resolution.reach:
-        needed = int(np.ceil(2 * farthest))
+    known, needed = _path_over_face(pair, contact), pairs_on_path(pair, contact)
+    if known is not None and needed is not None and needed > resolution.chosen_pairs:
+        start, end = known
         raise ValueError(
             f"Resolution: pairs = {resolution.pairs} must be at least {needed}: the path of contact reaches from "
-            f"{float(start.min()):.3g} to {float(end.max()):.3g} base pitches around the pitch point"
+            f"{start:.3g} to {end:.3g} base pitches around the pitch point"
         )
+
+
+def _path_over_face(pair: GearPair, contact: PathOfContact) -> tuple[float, float] | None:
+    """Ends of the path of contact that a contact line runs over while any of it is on the face [base pitches]."""
+    ahead = 0.0 if pair.is_spur else _half_overlap(pair)
+    start, end, pitch, more = map(concrete, (contact.start, contact.end, contact.base_pitch, ahead))
+    if start is None or end is None or pitch is None or more is None:
+        return None
+    return float(((start - more) / pitch).min()), float(((end + more) / pitch).max())

@@ -45,15 +45,15 @@ def flank_pressure(kinematics: Kinematics, line_load: Load, relative_curvature: 
 
 
 def corner_pressure(kinematics: Kinematics, line_load: Load) -> Load:
-    """Pressure of the rounded tip edge on the mate's involute [MPa]; zero on the path of contact.
+    """Pressure of the rounded edge of tip or undercut on the mate's involute [MPa]; zero on the path of contact.
 
     1 / R = 1 / tip edge radius + 1 / rho_mate, taken as an elastic cylinder on the flank: 7 % (edge radius 0.2 mm) to
     about 50 % (0.002 mm) above the exact solution of a rounded edge.
     """
     pinion, wheel = kinematics.sides
-    before = kinematics.contact_path < kinematics.path_of_contact.start
-    edge = jnp.where(before, wheel.gear.edge_radius, pinion.gear.edge_radius)
-    mate = jnp.where(before, pinion.contact_roll_length, wheel.contact_roll_length)
+    of_wheel = kinematics.wheel_edge
+    edge = jnp.where(of_wheel, wheel.gear.edge_radius, pinion.gear.edge_radius)
+    mate = jnp.where(of_wheel, pinion.contact_roll_length, wheel.contact_roll_length)
     outside = over_slices(kinematics.contact_outside > 0)
     return jnp.where(outside, _hertz(kinematics, line_load, over_slices(reduced_radius(edge, mate))), 0.0)
 

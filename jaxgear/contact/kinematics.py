@@ -12,6 +12,11 @@ To second order S = x^2 rho_tip C / (2 rho_mate r_b,tip^2) with C = rho_tip + rh
 zero slope. All differences are formed without cancellation, so single precision keeps 1e-4 um where contact is
 possible.
 
+Where the path ends at the form circle of an undercut tooth, there is no involute for the mate's tip corner to touch.
+Beyond that end it is the edge of the undercut that touches the mate's flank: the same closed form with the roles of the
+gears exchanged and the corner on its way towards the end of the path instead of from it (x < 0). It ends where the edge
+passes the mate's tip: the gap then opens as around the rounded tip edge.
+
 References:
     The geometry is that of R. G. Munro, L. Morrish, D. Palmer, Proc. IMechE C 213 (1999) 389-400; the closed form here
     is derived from the involute's generation.
@@ -24,10 +29,10 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Bool, Float
 
 from ..compliance import Plane
-from ..geometry import Gear, GearPair, PathOfContact, explicit, path_of_contact
+from ..geometry import Gear, GearPair, Outline, PathOfContact, explicit, path_of_contact
 from ..microgeometry import Flank
 from ..numerics import Checked, changed, concrete, on_both, over_batch, program, real, result
 from .resolution import Resolution
@@ -203,6 +208,18 @@ class Kinematics(Checked):
 
     @property
     @over_batch
+    def wheel_edge(self) -> Bool[Array, "pairs *slices positions"]:
+        """Whether an edge of the wheel touches the pinion outside the path of contact, and not one of the pinion.
+
+        Ahead of the path that is the tip of the wheel, or, where the path begins at the form circle of the pinion, its
+        edge there; behind the path the other way round.
+        """
+        path, contact = self.contact_path, self.path_of_contact
+        ahead = (path < contact.start) & (contact.start_shortened <= 0)
+        return ahead | ((path > contact.end) & (contact.end_shortened > 0))
+
+    @property
+    @over_batch
     def sides(self) -> tuple[Side, Side]:
         """Pinion and wheel."""
         return _sides(self.explicit)
@@ -259,12 +276,14 @@ class Contacts(eqx.Module):
         corner_gap: gap of the unmodified flanks outside the path of contact [um], zero on it.
         lever: what a pair closes per unit of transmission error; 1 on the path of contact, less beyond it, because the
             corner's gap opens while the gears turn on.
+        beyond_tip: distance outside the path of contact of those where a tip corner touches [mm], zero elsewhere.
     """
 
     pinion_roll_length: Float[Array, "..."]
     wheel_roll_length: Float[Array, "..."]
     corner_gap: Float[Array, "..."]
     lever: Float[Array, "..."]
+    beyond_tip: Float[Array, "..."]
 
 
 def contacts(pair: GearPair, contact: PathOfContact, path: Float[Array, "..."], extended: bool = True) -> Contacts:
@@ -278,41 +297,72 @@ def contacts(pair: GearPair, contact: PathOfContact, path: Float[Array, "..."], 
     pinion_base, wheel_base = contact.pinion_base_radius, contact.wheel_base_radius
     approach = pair.wheel.tip_roll_length, wheel_base, contact.pinion_roll_length(contact.start), pinion_base
     recess = pair.pinion.tip_roll_length, pinion_base, contact.wheel_roll_length(contact.end), wheel_base
-    before, after = on_both(
-        lambda given: _corner(*given, REACH * contact.base_pitch),
-        (contact.start - path, approach),
-        (path - contact.end, recess),
+    outside = contact.start - path, path - contact.end
+    at_form = contact.start_shortened > 0, contact.end_shortened > 0
+    tips = (  # of the gear whose tip is at that end
+        (contact.wheel_roll_length(contact.start), pair.wheel.tip_edge_radius),
+        (contact.pinion_roll_length(contact.end), pair.pinion.tip_edge_radius),
     )
+    # the edge of an undercut passes the tip of the mate about as far outside the path as this is shortened
+    reaches = (REACH * contact.base_pitch + less for less in (contact.start_shortened, contact.end_shortened))
+    before, after = on_both(lambda given: _corner(*given), *zip(outside, at_form, (approach, recess), tips, reaches))
     on_path = jnp.clip(path, contact.start, contact.end)
     apart = 0.0 if extended else jnp.where(path == on_path, 0.0, 1e3 * contact.base_pitch)
+    ahead, behind = (x > 0 for x in outside)
     return Contacts(
-        jnp.where(path < contact.start, before.mate_roll_length, contact.pinion_roll_length(on_path)),
-        jnp.where(path > contact.end, after.mate_roll_length, contact.wheel_roll_length(on_path)),
+        jnp.select(
+            [ahead & ~at_form[0], behind & at_form[1]],
+            [before.touched, after.touched],
+            contact.pinion_roll_length(on_path),
+        ),
+        jnp.select(
+            [behind & ~at_form[1], ahead & at_form[0]],
+            [after.touched, before.touched],
+            contact.wheel_roll_length(on_path),
+        ),
         before.gap + after.gap + apart,
         1 - 0.5e-3 * (before.slope + after.slope),
+        jnp.add(*(jnp.where(form, 0.0, jnp.maximum(x, 0.0)) for form, x in zip(at_form, outside))),
     )
 
 
 class _Corner(NamedTuple):
-    """A tip corner at the mate's flank: gap [um], its slope [um/mm] and the mate's roll length [mm]."""
+    """A corner at the mate's flank: gap [um], its slope [um/mm] and the roll length of the touched flank [mm]."""
 
     gap: Float[Array, "..."]
     slope: Float[Array, "..."]
-    mate_roll_length: Float[Array, "..."]
+    touched: Float[Array, "..."]
 
 
-def _corner(x: Array, lengths: Sequence[Array], reach: Array) -> _Corner:
-    """The corner at a distance outside the path [mm], zero on it; `lengths` as `corner_gap` takes them.
+def _corner(x: Array, at_form: Array, lengths: Sequence[Array], tip_end: Sequence[Array], reach: Array) -> _Corner:
+    """The corner at a distance outside the path [mm], zero on it.
 
     Beyond `reach` the gap goes on along its tangent, so that far pairs stay finite and apart.
+
+    Args:
+        x: distance outside the path.
+        at_form: whether the path ends at the form circle of the mate, whose edge touches then.
+        lengths: of the tip corner and its mate, as `corner_gap` takes them.
+        tip_end: roll length at this end of the path of the gear whose tip is there, and radius of its tip edge.
+        reach: [mm].
     """
     near = jnp.clip(x, 0.0, reach)
+    (tip, tip_base, mate, mate_base), (tip_gear_end, edge_radius) = lengths, tip_end
+    chosen = [jnp.where(at_form, *both) for both in zip((mate, mate_base, tip_gear_end, tip_base), lengths)]
     # one number at every point each: a derivative then sums over the points once
-    lengths = [jnp.broadcast_to(length, x.shape) for length in lengths]
-    (gap, rho), (slope, _) = jax.jvp(lambda t: corner_gap(t, *lengths), (near,), (jnp.ones_like(near),))
+    chosen = [jnp.broadcast_to(length, x.shape) for length in chosen]
+    tip, tip_base, rounding, form = (jnp.broadcast_to(each, x.shape) for each in (tip, tip_base, edge_radius, at_form))
+
+    def touching(t: Array) -> tuple[Array, Array]:
+        gap, touched = corner_gap(jnp.where(form, -t, t), *chosen)
+        past = jnp.maximum(touched**2 - tip**2, 0.0) / (2 * tip_base)  # the tip, along the flank
+        opened = 1e3 * (jnp.sqrt(past**2 + rounding**2) - rounding)
+        return jnp.where(form, gap + opened, gap), jnp.where(form, jnp.minimum(touched, tip), touched)
+
+    (gap, touched), (slope, _) = jax.jvp(touching, (near,), (jnp.ones_like(near),))
     outside = x > 0
     gap = gap + slope * (jnp.maximum(x, reach) - reach)
-    return _Corner(jnp.where(outside, gap, 0.0), jnp.where(outside, slope, 0.0), rho)
+    return _Corner(jnp.where(outside, gap, 0.0), jnp.where(outside, slope, 0.0), touched)
 
 
 def sides(pair: GearPair, contact: PathOfContact, points: Contacts) -> tuple[Side, Side]:
@@ -338,8 +388,14 @@ def sides(pair: GearPair, contact: PathOfContact, points: Contacts) -> tuple[Sid
     )
 
 
-def kinematics(pair: GearPair, first_phase: Scalar, resolution: Resolution, plane: Plane) -> Kinematics:
-    """The kinematics of a pair."""
-    contact = path_of_contact(pair)
+def kinematics(
+    pair: GearPair,
+    first_phase: Scalar,
+    resolution: Resolution,
+    plane: Plane,
+    outlines: tuple[Outline, Outline] | None = None,
+) -> Kinematics:
+    """The kinematics of a pair; `outlines` of its gears where they are known."""
+    contact = path_of_contact(pair, outlines)
     helical = pair.pinion.helix_angle is not None
     return Kinematics(pair, contact, first_phase.astype(contact.start.dtype), resolution, plane, helical)

@@ -51,7 +51,7 @@ def gears_of(pair: GearPair, compliance: AbstractCompliance, count: int) -> Gear
         count: tooth pairs that are carried along.
     """
     outlines = on_both(outline, pair.pinion, pair.wheel)
-    margins = margins_between(*outlines, path_of_contact(pair), pair.center_distance, pair.face_overlap)
+    margins = margins_between(*outlines, path_of_contact(pair, outlines), pair.center_distance, pair.face_overlap)
     return Gears(outlines, margins, compliance.of_gears(*outlines, count))
 
 
@@ -292,14 +292,14 @@ def _arrays_of(
     """`prepare_from`, for an `explicit` pair and the sizes `of_arrays`."""
     compliance, outlines = gears.compliance, gears.outlines
     plane = contact_plane(compliance.plane)
-    moving = kinematics(pair, first_phase, resolution, plane)
+    moving = kinematics(pair, first_phase, resolution, plane, outlines)
     contact = moving.path_of_contact
     points = contacts(pair, contact, moving.contact_path, resolution.extended_contact)
     # what compliances know of are pairs at positions: of helical gears those of all slices
     rolls = [at.reshape(len(at), -1) for at in (points.pinion_roll_length, points.wheel_roll_length)]
     pinion, wheel = on_both(lambda given: tooth_load(*given), *zip(outlines, rolls))
     geometry = contact_geometry(pinion, wheel, plane, pair.face_width)
-    law = compliance.law(geometry, pinion, wheel, moving.contact_outside.reshape(rolls[0].shape))
+    law = compliance.law(geometry, pinion, wheel, points.beyond_tip.reshape(rolls[0].shape))
     base_pitch = contact.base_pitch
     beyond = jnp.stack([moving.contact_path[-1] - base_pitch, moving.contact_path[0] + base_pitch])
     outer = contacts(pair, contact, beyond, resolution.extended_contact)

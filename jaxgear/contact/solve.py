@@ -28,6 +28,7 @@ from ..numerics import (
     tangent_stiffness,
 )
 from ..numerics.programs import begin
+from .covering import may_take_more
 from .cycle import MeshCycle
 from .face_coupling import check_torque, ends_together, holds_at
 from .mesh import Mesh, begin_mesh, resized
@@ -36,8 +37,6 @@ from .resolution import Resolution
 from .slide import Own, RemovedMaterial, as_removed, for_contact, loaded_material, nothing_removed
 from .status import Status, Statuses, status_of
 from .support import AbstractSupport
-
-_MOST_PAIRS = 12
 
 Scalar = Float[Array, ""]
 Curve = Float[Array, " positions"]
@@ -246,8 +245,10 @@ def wider_mesh(mesh: Mesh, status: Statuses) -> Mesh | None:
 
 def more_pairs_help(mesh: Mesh, status: Statuses) -> bool:
     """Whether a result on a mesh whose number of pairs was left open needs more of them; False while it is traced."""
-    known = concrete(status) if mesh.automatic and mesh.resolution.chosen_pairs < _MOST_PAIRS else None
-    return known is not None and bool((known == Status.MORE_PAIRS_NEEDED).any())
+    known = concrete(status) if mesh.automatic else None
+    if known is None or not (known == Status.MORE_PAIRS_NEEDED).any():
+        return False
+    return may_take_more(mesh.pair, mesh.path_of_contact, mesh.resolution)
 
 
 class Contact(NamedTuple):

@@ -26,6 +26,8 @@ _RACK_HEIGHTS = 0.5, 2.0
 _LEAST_BORE = 0.02
 # of tip edges without a radius [modules]
 _USUAL_EDGE, _LEAST_EDGE = 0.05, 1e-3
+# of ISO 53 profile A, and what the rounding of its digits is worth, coefficients of the module
+_ROOT_RADIUS, _RACK_ACCURACY = 0.38, 1e-4
 # by how much the tip form circle may lie outside the tip circle [mm], which a drawing rounds
 CHAMFER_ACCURACY = 1e-3
 # by how much, relative, a number that is given with four digits may be beyond the one that limits it
@@ -46,7 +48,8 @@ class Gear(Checked):
         face_width: face width b [mm].
         helix_angle: beta on the reference cylinder, positive for a right hand [deg]; None, or 0, for a spur gear. Where
             it is traced, the mesh is that of a helical pair whatever its value.
-        addendum, dedendum, root_radius: coefficients h_aP, h_fP and rho_fP of the basic rack, in modules (ISO 53).
+        addendum, dedendum, root_radius: coefficients h_aP, h_fP and rho_fP of the basic rack, in modules (ISO 53). A
+            root radius that is not given is 0.38, or the full radius of the rack where its tip has no room for that.
         protuberance: pr, by which the tool protrudes from its flanks at its tip, normal to them, coefficient of the
             module; None for a tool without. The flank of the protuberance is inclined by half the pressure angle. It
             takes `protuberance` less the grinding allowance off the root of the finished tooth, and d_Ff is where the
@@ -93,7 +96,7 @@ class Gear(Checked):
     )
     addendum: Scalar = number("x module", low=_RACK_HEIGHTS[0], high=_RACK_HEIGHTS[1], default=1.0, kw_only=True)
     dedendum: Scalar = number("x module", low=_RACK_HEIGHTS[0], high=_RACK_HEIGHTS[1], default=1.25, kw_only=True)
-    root_radius: Scalar = number("x module", low=0.0, default=0.38, kw_only=True)
+    root_radius: Scalar = number("x module", low=0.0, optional=True, default=None, kw_only=True)
     protuberance: Scalar | None = number("x module", low=0.0, high=0.2, optional=True, default=None, kw_only=True)
     grinding_allowance: Scalar | None = number("um", low=0.0, optional=True, default=None, kw_only=True)
     tip_diameter: Scalar | None = number("mm", low=0.0, open_low=True, optional=True, default=None, kw_only=True)
@@ -109,7 +112,10 @@ class Gear(Checked):
     def check_together(self) -> None:
         if self.helix_angle is not None and self.is_spur:
             object.__setattr__(self, "helix_angle", None)  # programs tell spur gears by it, where numbers are traced
-        check("Gear", "root_radius", self.root_radius, "x module", low=0.0, high=_rack_radius_limit(self))
+        limit = _rack_radius_limit(self)
+        if self.root_radius is None:
+            object.__setattr__(self, "root_radius", _usual_root_radius(self))
+        check("Gear", "root_radius", self.root_radius, "x module", low=0.0, high=limit)
         if self.grinding_allowance is not None:
             if self.protuberance is None:
                 raise ValueError("Gear: protuberance: missing, grinding_allowance needs it")
@@ -140,6 +146,9 @@ class Gear(Checked):
         if edge is not None and usual is not None and edge.ndim == 0:
             meaning = f"{_USUAL_EDGE:g} modules" if edge == usual else "half the tip land"
             text = text.replace("tip_edge_radius=None", f"tip_edge_radius={float(edge):.4g} mm ({meaning})")
+        if has_full_radius(self):
+            said = f"root_radius={float(self.root_radius):.6g} x module"
+            text = text.replace(said, f"{said} (full radius of the rack)")
         return text
 
     @property
@@ -347,7 +356,10 @@ def shape_faults(gear: Gear) -> tuple[str, ...]:
     height, land, rim, chamfer, left, room, tip, form, base, root, bore = (float(number) for number in shape)
     name = "addendum" if gear.tip_diameter is None else "tip_diameter"
     faults = []
-    if not height > 0:
+    in_radians = None if gear.tip_diameter is None or height > 0 and land > 0 else tip_in_radians(gear)
+    if in_radians is not None:
+        faults.append(in_radians)
+    elif not height > 0:
         faults.append(f"Gear: {name}: tip diameter = {tip:g} mm must be greater than {max(base, root):g} mm")
     elif not land > 0:
         faults.append(
@@ -374,6 +386,25 @@ def shape_faults(gear: Gear) -> tuple[str, ...]:
     return tuple(faults)
 
 
+def tip_in_radians(gear: Gear) -> str | None:
+    """The fault of a helix angle in radians, told by the tip diameter that it makes; None where it is not that."""
+    meant = degrees_meant(gear)
+    if meant is None:
+        return None
+    turned = changed(gear, helix_angle=real(meant), tip_diameter=None)
+    if abs(float(turned.tip_radius) - float(gear.tip_radius)) > float(gear.module):
+        return None
+    assert gear.helix_angle is not None
+    given = f"Gear: helix_angle = {float(gear.helix_angle):g} deg"
+    return f"{given} does not go with tip_diameter = {2 * float(gear.tip_radius):g} mm: give degrees, {meant:.4g} deg?"
+
+
+def degrees_meant(gear: Gear) -> float | None:
+    """A concrete helix angle [deg] that is small enough to be one in radians, as if it were one; else None."""
+    angle = 0.0 if gear.helix_angle is None else float(gear.helix_angle)
+    return float(np.rad2deg(angle)) if 0 < abs(angle) <= np.deg2rad(_MOST_HELIX_ANGLE) else None
+
+
 @program
 def _shape(gear: Gear) -> tuple[Scalar, ...]:
     """Margins of the shape, then the diameters of tip, tip form, base and root circle and bore [mm]."""
@@ -386,13 +417,37 @@ def _shape(gear: Gear) -> tuple[Scalar, ...]:
 
 
 def _rack_radius_limit(gear: Gear) -> float | None:
-    """Largest root radius that fits into the tip of the rack, coefficient of the module (ISO 53), or None if traced.
-
-    The rack tip is pi/4 - dedendum tan(alpha) wide on either side of its centre; its full rounding has that width.
-    """
+    """Largest root radius that fits into the tip of the rack, coefficient of the module (ISO 53), or None if traced."""
     alpha, dedendum = concrete(gear.pressure_angle), concrete(gear.dedendum)
     if alpha is None or dedendum is None:
         return None
-    angle = np.deg2rad(alpha)
     # ISO 53 profile A prints 0.38 for a limit of 0.37995: rounding to two digits is within the rack's tolerance
-    return float((np.pi / 4 - dedendum * np.tan(angle)) * np.cos(angle) / (1 - np.sin(angle))) + 1e-4
+    return float(_full_radius(alpha, dedendum)) + _RACK_ACCURACY
+
+
+def _full_radius(pressure_angle: Any, dedendum: Any) -> Any:
+    """Radius that rounds the whole tip of the rack, coefficient of the module, of NumPy's or JAX's numbers.
+
+    The tip is pi/4 - dedendum tan(alpha) wide on either side of its centre.
+    """
+    of = np if isinstance(pressure_angle, np.ndarray) and isinstance(dedendum, np.ndarray) else jnp
+    angle = of.deg2rad(pressure_angle)
+    return (np.pi / 4 - dedendum * of.tan(angle)) * of.cos(angle) / (1 - of.sin(angle))
+
+
+def _usual_root_radius(gear: Gear) -> Scalar:
+    """Root radius of ISO 53 profile A, or the full radius of the rack where that is smaller."""
+    alpha, dedendum = concrete(gear.pressure_angle), concrete(gear.dedendum)
+    if alpha is None or dedendum is None:
+        full = _full_radius(gear.pressure_angle, gear.dedendum)
+        return jnp.where(full + _RACK_ACCURACY < _ROOT_RADIUS, full, _ROOT_RADIUS)
+    full = float(_full_radius(alpha, dedendum))
+    return real(full if full + _RACK_ACCURACY < _ROOT_RADIUS else _ROOT_RADIUS)
+
+
+def has_full_radius(gear: Gear) -> bool:
+    """Whether the fillet is known to be cut by the full radius of a rack that has no room for the usual one."""
+    radius, alpha, dedendum = (concrete(each) for each in (gear.root_radius, gear.pressure_angle, gear.dedendum))
+    if radius is None or alpha is None or dedendum is None or radius.ndim:
+        return False
+    return bool(radius < _ROOT_RADIUS and abs(radius - _full_radius(alpha, dedendum)) < _RACK_ACCURACY)

@@ -4,13 +4,16 @@ One rule for each margin decides both: `Margins.held`. Concrete pairs are refuse
 """
 
 from collections.abc import Mapping
+from typing import Any
 
 import equinox as eqx
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Bool, Float
 
 from ..numerics import Checked, Given, result, safe_sqrt
-from .gear import CHAMFER_ACCURACY, Gear, shape_faults
+from .gear import CHAMFER_ACCURACY, Gear, degrees_meant, shape_faults
+from .interference import fillet_clearance
 from .involute import diameter, involute
 from .outline import Outline, outline
 from .path import PathOfContact, backlash_free_involute, pressure_angle_of
@@ -21,6 +24,7 @@ Scalar = Float[Array, ""]
 _OUTLINE_ACCURACY = 1e-3
 # single precision resolves a centre distance to about 1e-7 of its value
 _DISTANCE_ACCURACY = 1e-6
+_LEAST_DECIMALS = 2  # that drawings give
 
 
 class Accuracy(eqx.Module):
@@ -46,10 +50,14 @@ class Margins(Checked):
         pinion_tip_height, wheel_tip_height: height of the tip above base and root circle [mm].
         pinion_rim_thickness, wheel_rim_thickness: from the bore to the root circle [mm].
         pinion_form_clearance, wheel_form_clearance: roll length at which the mate's tip meets the flank beyond that of
-            the form circle, where the usable involute starts [mm].
+            the form circle, where the usable involute starts [mm]. Below zero the path of contact begins at the form
+            circle, and the pair runs where the fillet is clear.
+        pinion_fillet_clearance, wheel_fillet_clearance: least arc between the fillet of the gear and the tip of the
+            mate [mm].
         pinion_tip_clearance, wheel_tip_clearance: from the gear's tip to the mate's root circle on the line of
             centres [mm].
-        contact_ratio_margin: transverse contact ratio minus 1.
+        contact_ratio_margin: transverse contact ratio minus 1. Helical gears run below 0 too, where the overlap ratio
+            makes up for it.
         backlash: play between the unloaded flanks on the line of action [um], by centre distance and tooth thickness
             allowances; without a given centre distance that of the allowances alone.
         base_circle_clearance: centre distance minus both base radii [mm].
@@ -58,6 +66,7 @@ class Margins(Checked):
             ones [rad]. No margin: it must vanish.
         tip_overrun: by how much a tip form circle lies outside its tip circle, the larger of both gears [mm]. No
             margin: it must not be positive, and is zero without chamfers.
+        overlap_ratio: of the faces.
         accuracy: by how much clearances of the form circles and backlash may lie below zero.
     """
 
@@ -69,6 +78,8 @@ class Margins(Checked):
     wheel_rim_thickness: Scalar = result("mm")
     pinion_form_clearance: Scalar = result("mm")
     wheel_form_clearance: Scalar = result("mm")
+    pinion_fillet_clearance: Scalar = result("mm")
+    wheel_fillet_clearance: Scalar = result("mm")
     pinion_tip_clearance: Scalar = result("mm")
     wheel_tip_clearance: Scalar = result("mm")
     contact_ratio_margin: Scalar = result("")
@@ -77,6 +88,7 @@ class Margins(Checked):
     face_overlap: Scalar = result("mm")
     base_pitch_difference: Scalar = eqx.field(repr=False)
     tip_overrun: Scalar = eqx.field(repr=False)
+    overlap_ratio: Scalar = eqx.field(repr=False)
     accuracy: Accuracy = eqx.field(repr=False)
 
     @property
@@ -93,9 +105,12 @@ class Margins(Checked):
             "base_circle_clearance": self.base_circle_clearance > 0,
             "backlash": self.backlash >= -self.accuracy.backlash,
             "face_overlap": self.face_overlap > 0,
-            "contact_ratio_margin": self.contact_ratio_margin >= 0,
-            "pinion_form_clearance": self.pinion_form_clearance >= -self.accuracy.pinion_form,
-            "wheel_form_clearance": self.wheel_form_clearance >= -self.accuracy.wheel_form,
+            "contact_ratio_margin": (self.contact_ratio_margin > -1)
+            & (self.contact_ratio_margin + jnp.maximum(self.overlap_ratio, 0.0) >= 0),
+            "pinion_form_clearance": (self.pinion_form_clearance >= -self.accuracy.pinion_form)
+            | (self.pinion_fillet_clearance >= -_OUTLINE_ACCURACY),
+            "wheel_form_clearance": (self.wheel_form_clearance >= -self.accuracy.wheel_form)
+            | (self.wheel_fillet_clearance >= -_OUTLINE_ACCURACY),
             "pinion_tip_clearance": self.pinion_tip_clearance >= -_OUTLINE_ACCURACY,
             "wheel_tip_clearance": self.wheel_tip_clearance >= -_OUTLINE_ACCURACY,
         }
@@ -115,6 +130,7 @@ def margins_between(
     tangent = path.pinion_pitch_roll_length / path.pinion_base_radius
     secant = jnp.sqrt(1 + tangent**2)
     distance = both * secant if center_distance is None else center_distance
+    pitch = path.pinion_pitch_roll_length, path.wheel_pitch_roll_length
     return Margins(
         pinion_tip_land=first.tip_land,
         wheel_tip_land=second.tip_land,
@@ -122,8 +138,10 @@ def margins_between(
         wheel_tip_height=second.tip_height,
         pinion_rim_thickness=first.body_thickness,
         wheel_rim_thickness=second.body_thickness,
-        pinion_form_clearance=path.pinion_roll_length(path.start) - pinion.form_roll_length,
-        wheel_form_clearance=path.wheel_roll_length(path.end) - wheel.form_roll_length,
+        pinion_form_clearance=path.pinion_roll_length(path.start) - path.start_shortened - pinion.form_roll_length,
+        wheel_form_clearance=path.wheel_roll_length(path.end) - path.end_shortened - wheel.form_roll_length,
+        pinion_fillet_clearance=fillet_clearance(pinion, second, *pitch, distance),
+        wheel_fillet_clearance=fillet_clearance(wheel, first, *pitch[::-1], distance),
         pinion_tip_clearance=distance - first.tip_radius - second.root_circle_radius,
         wheel_tip_clearance=distance - second.tip_radius - first.root_circle_radius,
         contact_ratio_margin=path.contact_ratio - 1,
@@ -131,6 +149,7 @@ def margins_between(
         base_circle_clearance=distance - both,
         face_overlap=face_overlap,
         base_pitch_difference=_apart(first, second),
+        overlap_ratio=face_overlap * jnp.abs(jnp.tan(first.base_helix_angle)) / first.base_pitch,
         tip_overrun=-jnp.minimum(first.tip_chamfer, second.tip_chamfer),
         accuracy=Accuracy(
             pinion_form=_form_accuracy(pinion),
@@ -210,7 +229,9 @@ def faults_between(
             f"{reach:g} mm, half the sum of both face widths: the faces do not overlap"
         )
     if "contact_ratio_margin" in missed:
-        faults.append(_contact_ratio_fault(pinion, wheel, center_distance, float(margins.contact_ratio_margin) + 1))
+        transverse = float(margins.contact_ratio_margin) + 1
+        total = transverse + max(float(margins.overlap_ratio), 0.0) if transverse > 0 else transverse
+        faults.append(_contact_ratio_fault(pinion, wheel, center_distance, total))
     for name, mate, gear in (("pinion", "wheel", pinion), ("wheel", "pinion", wheel)):
         if f"{name}_form_clearance" in missed:
             faults.append(_form_fault(name, mate, gear, float(getattr(margins, f"{name}_form_clearance"))))
@@ -225,21 +246,57 @@ def faults_between(
 
 def _backlash_fault(pinion: Gear, wheel: Gear, center_distance: Given | None) -> str:
     assert center_distance is not None  # that of None leaves no backlash to miss
-    both = pinion.base_radius + wheel.base_radius
-    angle = pressure_angle_of(backlash_free_involute(pinion, wheel) + 0.5e-3 * thickening(pinion, wheel) / both)
-    free = float(both / jnp.cos(angle)) * (1 - _DISTANCE_ACCURACY)
+    free = float(free_distance(pinion, wheel)) * (1 - _DISTANCE_ACCURACY)
     unit = "mm (backlash-free)"
     return f"GearPair: center_distance = {float(center_distance):g} {unit} must be at least {free:g} {unit}"
+
+
+def free_distance(pinion: Gear, wheel: Gear) -> Scalar:
+    """Centre distance without backlash [mm], of the mean tooth thicknesses."""
+    both = pinion.base_radius + wheel.base_radius
+    return both / jnp.cos(
+        pressure_angle_of(backlash_free_involute(pinion, wheel) + 0.5e-3 * thickening(pinion, wheel) / both)
+    )
+
+
+def rounded_by(pinion: Gear, wheel: Gear, center_distance: Given) -> float:
+    """Part of a concrete centre distance that the rounding of the given digits is worth [mm].
+
+    That of its own digits, and of those of both profile shifts and the helix angle: half a unit of the last one, of
+    numbers that are given to fewer than two decimals of the second.
+    """
+    angle = 0.0 if pinion.helix_angle is None else abs(float(pinion.helix_angle))
+    shifts = _half_unit(pinion.profile_shift) + _half_unit(wheel.profile_shift)
+    tilted = float(center_distance) * np.tan(np.deg2rad(angle)) * np.deg2rad(_half_unit(angle)) if angle else 0.0
+    return _half_unit(center_distance) + float(pinion.module) * shifts + float(tilted)
+
+
+def _half_unit(value: Given) -> float:
+    known: Any = np.asarray(value)[()]  # in its own precision, whose shortest digits are those that were given
+    digits = np.format_float_positional(known, trim="-").partition(".")[2]
+    return 0.5 * 10.0 ** -max(len(digits), _LEAST_DECIMALS)
 
 
 def _contact_ratio_fault(pinion: Gear, wheel: Gear, center_distance: Given | None, contact_ratio: float) -> str:
     remedy = "raise a tip_diameter or addendum"
     if center_distance is None:
-        return f"GearPair: contact ratio = {contact_ratio:.4g} must be at least 1: {remedy}"
+        return f"GearPair: {_ratio(pinion)} = {contact_ratio:.4g} must be at least 1: {remedy}"
+    angle = degrees_meant(pinion)
+    if angle is not None:
+        closest = 0.5 * float(pinion.module) * float(pinion.teeth + wheel.teeth) / float(np.cos(np.deg2rad(angle)))
+        if abs(closest - float(center_distance)) < 2 * float(pinion.module):
+            return (
+                f"GearPair: pinion helix_angle = {np.deg2rad(angle):g} deg does not go with center_distance = "
+                f"{float(center_distance):g} mm: give degrees, {angle:.4g} deg?"
+            )
     given, reach = f"GearPair: center_distance = {float(center_distance):g} mm", pinion.tip_radius + wheel.tip_radius
     if not float(center_distance) < float(reach):
         return f"{given} must be less than {float(reach):g} mm, the sum of both tip radii: the teeth do not meet"
-    return f"{given} leaves a contact ratio of {contact_ratio:.4g}, must be at least 1: lower it, or {remedy}"
+    return f"{given} leaves a {_ratio(pinion)} of {contact_ratio:.4g}, must be at least 1: lower it, or {remedy}"
+
+
+def _ratio(gear: Gear) -> str:
+    return "contact ratio" if gear.helix_angle is None else "total contact ratio"
 
 
 def _form_fault(name: str, mate: str, gear: Gear, clearance: float) -> str:

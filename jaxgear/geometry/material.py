@@ -21,7 +21,7 @@ class Material(Checked):
     """
 
     elastic_modulus: Scalar = number("MPa", low=0.0, open_low=True, default=206_000.0, usual=_MODULI)
-    poisson_ratio: Scalar = number("", low=0.0, high=0.5, open_high=True, default=0.3)
+    poisson_ratio: Scalar = number("", low=0.0, high=0.5, default=0.3)
     density: Scalar = number("kg/m^3", low=0.0, open_low=True, default=7850.0)
     thermal_contact_coefficient: Scalar = number("N/(m s^0.5 K)", low=0.0, open_low=True, default=13_800.0)
 

@@ -1,19 +1,22 @@
 """Two gears on their operating centre distance."""
 
+import logging
+
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, PyTree
 
-from ..numerics import Checked, changed, concrete, number, on_both, program
+from ..numerics import Checked, changed, concrete, number, on_both, program, real
 from .gear import Gear, with_diameters
-from .margins import Margins, faults_between, margins_between
-from .outline import outline
+from .margins import Margins, faults_between, free_distance, margins_between, rounded_by
+from .outline import Outline, outline
 from .path import PathOfContact, path_between, working_pressure_angle
 
 Scalar = Float[Array, ""]
 Real = Float[Array, "*pairs"]  # one number of each pair, where `jax.vmap` made many
 
+_LOG = logging.getLogger(f"{__name__.partition('.')[0]}.unusual")
 # of the narrower face: what counts as common where there is nothing in common, for numbers to stay finite
 _LEAST_OVERLAP = 1e-3
 
@@ -25,15 +28,16 @@ class GearPair(Checked):
         pinion: driving gear.
         wheel: driven gear.
         center_distance: operating centre distance [mm]; None for the backlash-free one of the nominal tooth
-            thicknesses, to which tooth thickness allowances add their play.
+            thicknesses, to which tooth thickness allowances add their play. A concrete one that is too small by no more
+            than the rounding of its digits and of those of profile shifts and helix angle becomes the backlash-free
+            one, with a warning of the logger "jaxgear.unusual".
         axial_offset: of the middle of the wheel's face from that of the pinion's, positive towards positive face
             coordinates [mm].
 
     Raises:
         ValueError: for gears that do not share module or pressure angle, helical gears of the same hand, an impossible
-            centre distance, a contact ratio below 1, a tip that touches the mate's flank below its form circle or the
-            mate's root circle, faces that do not overlap: the first of what `explain` lists. Pairs made while being
-            traced pass; their `margins` tell.
+            centre distance, a total contact ratio below 1, a tip that hits the mate's fillet or root circle, faces that
+            do not overlap: the first of what `explain` lists. Pairs made while being traced pass; their `margins` tell.
     """
 
     pinion: Gear
@@ -47,6 +51,8 @@ class GearPair(Checked):
                 raise ValueError(
                     f"GearPair: {name} holds gears of shape {gear.teeth.shape}, must be one; make many with jax.vmap"
                 )
+        if self.center_distance is not None and not _traced(self):
+            object.__setattr__(self, "center_distance", _unrounded(self, self.center_distance))
         for fault in _faults(self):
             raise ValueError(fault)
 
@@ -168,16 +174,17 @@ class GearPair(Checked):
         return self.wheel.teeth / self.pinion.teeth
 
 
-def path_of_contact(pair: GearPair) -> PathOfContact:
-    """Path of contact of a pair, limited by the two tip circles."""
-    return path_between(pair.pinion, pair.wheel, pair.center_distance)
+def path_of_contact(pair: GearPair, outlines: tuple[Outline, Outline] | None = None) -> PathOfContact:
+    """Path of contact of a pair, limited by tip and form circles; `outlines` of its gears where they are known."""
+    forms = None if outlines is None else (outlines[0].form_roll_length, outlines[1].form_roll_length)
+    return path_between(pair.pinion, pair.wheel, pair.center_distance, forms)
 
 
 @program
 def margins(pair: GearPair) -> Margins:
     """How far a pair is from what cannot run; finite and differentiable for impossible gears too."""
     outlines = on_both(outline, pair.pinion, pair.wheel)
-    return margins_between(*outlines, path_of_contact(pair), pair.center_distance, pair.face_overlap)
+    return margins_between(*outlines, path_of_contact(pair, outlines), pair.center_distance, pair.face_overlap)
 
 
 def explain(pair: GearPair) -> tuple[str, ...]:
@@ -194,6 +201,26 @@ def explain(pair: GearPair) -> tuple[str, ...]:
     if pair.pinion.teeth.ndim:
         raise ValueError(f"explain: pair holds pairs of shape {pair.pinion.teeth.shape}, must be one")
     return _faults(pair)
+
+
+def _unrounded(pair: GearPair, center_distance: Scalar) -> Scalar:
+    """The centre distance, or the backlash-free one where it is less by no more than its digits are rounded."""
+    known, held = _held(explicit(pair))
+    if _traced(known) or held["backlash"] or not held["base_circle_clearance"]:
+        return center_distance
+    given, free = float(center_distance), float(_free_distance(pair.pinion, pair.wheel))
+    if free - given > rounded_by(pair.pinion, pair.wheel, center_distance):
+        return center_distance
+    _LOG.warning(
+        "GearPair: center_distance = %.10g mm is less than the backlash-free one by no more than the rounding of the "
+        "given digits: %.10g mm is taken, without backlash",
+        given,
+        free,
+    )
+    return real(free)
+
+
+_free_distance = program(free_distance)
 
 
 def _faults(pair: GearPair) -> tuple[str, ...]:

@@ -1,11 +1,13 @@
 """Where two gears meet: operating pressure angle and centre distance, points A to E, contact ratio, sliding."""
 
+import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ..numerics import Checked, Given, bracketed_root, program, result
+from ..numerics import Checked, Given, bracketed_root, on_both, program, result
 from .gear import Gear
 from .involute import involute
+from .outline import outline
 
 Real = Float[Array, "..."]
 Scalar = Float[Array, ""]
@@ -17,13 +19,16 @@ class PathOfContact(Checked):
     """Points on the line of action, as `path` positions from the pitch point C [mm] (ISO 21771).
 
     Attributes:
-        start: A, tip of the wheel meets the root of the pinion.
-        inner_single: B, a preceding pair leaves contact at E.
-        outer_single: D, the following pair enters contact at A.
-        end: E, tip of the pinion leaves.
+        start: A, tip of the wheel meets the root of the pinion; form circle of the pinion (d_Ff = d_Nf) where that tip
+            would reach below it, as it does on undercut teeth.
+        inner_single: B, a preceding pair leaves contact at E; A where the contact ratio is below 1.
+        outer_single: D, the following pair enters contact at A; E where the contact ratio is below 1.
+        end: E, tip of the pinion leaves, or form circle of the wheel.
         base_pitch: of both gears.
         pinion_pitch_roll_length, wheel_pitch_roll_length: roll lengths of the two gears at C.
         pinion_base_radius, wheel_base_radius: base radii.
+        start_shortened, end_shortened: lengths by which the form circles of pinion and wheel shorten the path, zero
+            where it runs to the tip circle of the mate [mm].
     """
 
     start: Scalar = result("mm")
@@ -35,6 +40,8 @@ class PathOfContact(Checked):
     wheel_pitch_roll_length: Scalar = result("mm")
     pinion_base_radius: Scalar = result("mm")
     wheel_base_radius: Scalar = result("mm")
+    start_shortened: Scalar = eqx.field(repr=False)
+    end_shortened: Scalar = eqx.field(repr=False)
 
     @property
     def contact_ratio(self) -> Real:
@@ -98,20 +105,38 @@ def _missing_involute(tangent: Real, wanted: Real) -> Real:
 
 
 @program
-def path_between(pinion: Gear, wheel: Gear, center_distance: Scalar | None) -> PathOfContact:
-    """Path of contact at a centre distance [mm], or without backlash (None), limited by the two tip circles."""
+def path_between(
+    pinion: Gear, wheel: Gear, center_distance: Scalar | None, forms: tuple[Scalar, Scalar] | None = None
+) -> PathOfContact:
+    """Path of contact at a centre distance [mm], or without backlash (None), limited by tip and form circles.
+
+    Args:
+        pinion, wheel: gears.
+        center_distance: [mm].
+        forms: roll lengths at the form circles of both, where they are known [mm].
+    """
     tangent = jnp.tan(working_pressure_angle(pinion, wheel, center_distance))
     pinion_pitch, wheel_pitch = pinion.base_radius * tangent, wheel.base_radius * tangent
     start = wheel_pitch - wheel.tip_roll_length
     end = pinion.tip_roll_length - pinion_pitch
+    pinion_form, wheel_form = on_both(_form_roll_length, pinion, wheel) if forms is None else forms
+    start_shortened = jnp.maximum(pinion_form - pinion_pitch - start, 0.0)
+    end_shortened = jnp.maximum(end - (wheel_pitch - wheel_form), 0.0)
+    start, end = start + start_shortened, end - end_shortened
     return PathOfContact(
         start=start,
-        inner_single=end - pinion.base_pitch,
-        outer_single=start + pinion.base_pitch,
+        inner_single=jnp.maximum(end - pinion.base_pitch, start),
+        outer_single=jnp.minimum(start + pinion.base_pitch, end),
         end=end,
         base_pitch=pinion.base_pitch,
         pinion_pitch_roll_length=pinion_pitch,
         wheel_pitch_roll_length=wheel_pitch,
         pinion_base_radius=pinion.base_radius,
         wheel_base_radius=wheel.base_radius,
+        start_shortened=start_shortened,
+        end_shortened=end_shortened,
     )
+
+
+def _form_roll_length(gear: Gear) -> Scalar:
+    return outline(gear).form_roll_length

@@ -3,6 +3,7 @@
 import json
 import math
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
@@ -52,6 +53,9 @@ _DEFLECTIONS = 2.0
 _DYNAMIC_DEFLECTIONS = 5.5
 # Where gears are left open, at least as many as `prepare` takes for traced gears: contact ratios up to 3.
 _OPEN_PAIRS = 4
+# Deflection of a pair of teeth under the whole load [um per mm of module]: beyond a quarter of the module nothing is
+# linear, of whatever material.
+_MOST_DEFLECTION = 250.0
 # Torques of interest where the file names none, relative to the design torque.
 _TORQUE_RANGE = (0.5, 2.0)
 
@@ -295,9 +299,11 @@ class DesignFile:
         torque = max([torque, *(("wear" in self.tables and self.tables["wear"].torques) or ())])
         pair, times = self._middle.pair, _DYNAMIC_DEFLECTIONS if "dynamics" in self.tables else _DEFLECTIONS
         deflection = times * float(_single_deflection(pair, np.asarray(torque)))
-        try:
-            pairs = fewest_pairs(pair, deflection=deflection)
-        except ValueError:
+        pairs = None
+        if deflection <= times * _MOST_DEFLECTION * float(pair.pinion.module):
+            with suppress(ValueError):
+                pairs = fewest_pairs(pair, deflection=deflection)
+        if pairs is None:
             given = f"deflects a pair of teeth of module {float(pair.pinion.module):g} mm by"
             given = f"{torque:g} N m {given} {deflection / times:.3g} um"
             for name, gear in (("pinion", pair.pinion), ("wheel", pair.wheel)):
@@ -305,9 +311,10 @@ class DesignFile:
                 if modulus < usual.low:
                     material = self._mesh.pair.fields[name].fields["material"]
                     problem = f"{modulus:g} MPa is less than {usual.low:g} MPa ({usual.remark}), and {given}"
-                    raise DesignFileError(f"{material.key}.elastic_modulus", problem, self.path) from None
-            problem = f"{given}: give the torque in N m"
-            raise DesignFileError("load.torque", problem, self.path) from None
+                    raise DesignFileError(f"{material.key}.elastic_modulus", problem, self.path)
+            most = f"{_MOST_DEFLECTION:g} um per mm of module"
+            problem = f"{given}, must be at most {most}: give the torque in N m"
+            raise DesignFileError("load.torque", problem, self.path)
         if self._mesh.pair.free():  # other variants can have a larger contact ratio
             further = float(self._longest.overlap_ratio - pair.overlap_ratio)
             pairs = max(pairs + math.ceil(further), _OPEN_PAIRS)

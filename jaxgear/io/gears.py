@@ -171,6 +171,7 @@ def _fixed(part: Part) -> Any:
 
 def pair_of(section: PairSection, pinion: Part, wheel: Part) -> Part:
     """The pair of two gears, with what its table says."""
+    _check_alike(pinion, wheel)
     gears = _of_opposite_hands({"pinion": pinion, "wheel": wheel})
     pair = Part(GearPair, gears, section.at).having(**part_of(section, GearPair).fields)
     if section.backlash is None:
@@ -185,6 +186,18 @@ def pair_of(section: PairSection, pinion: Part, wheel: Part) -> Part:
             raise DesignFileError("pair.backlash", problem)
     by = {0: "center_distance", 1: open_gears[-1] if open_gears else "", 2: "both"}[len(open_gears)]
     return replace(pair.having(backlash=as_field(section.backlash, _BACKLASH), by=by), make=pair_with_backlash)
+
+
+def _check_alike(pinion: Part, wheel: Part) -> None:
+    """Refuses gears of different racks, before their other numbers are found to be impossible with them."""
+    for name in ("module", "pressure_angle"):
+        first, second = (gear.fields.get(name) for gear in (pinion, wheel))
+        if first is None or second is None or isinstance(first, Free) or isinstance(second, Free):
+            continue
+        if float(first) != float(second):
+            unit = fields_of(Gear)[name].unit
+            problem = f"{float(second):g} {unit} must equal the pinion's, {float(first):g} {unit}"
+            raise DesignFileError(f"{wheel.key}.{name}", problem)
 
 
 def _of_opposite_hands(gears: dict[str, Part]) -> dict[str, Part]:

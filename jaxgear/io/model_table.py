@@ -35,7 +35,7 @@ class ModelSection(section_of(Compliance)):  # type: ignore[misc]
 # Sizes up to these: a slip of the finger must not fill the memory or compile for hours.
 ResolutionSection = section_of(
     Resolution,
-    most=(("positions", 4096), ("slices", 1024), ("pairs", 12), ("contact_nodes", 64), ("newton_steps", 100)),
+    most=(("positions", 4096), ("slices", 1024), ("pairs", 64), ("contact_nodes", 64), ("newton_steps", 100)),
 )
 
 

@@ -20,6 +20,9 @@ from .results import describe, unit_of
 _SHORTEST = 0.3  # of a relief that is searched, in modules
 _MOST, _LEAST_MOST = 3.0, 20.0  # largest amount that is searched, relative to that of the rule and at least [um]
 
+# basic rack of ISO 53: degrees, and coefficients of the module
+_PRESSURE_ANGLE, _ADDENDUM, _DEDENDUM = 20.0, 1.0, 1.25
+
 _TEXT = """# {title}
 #
 # jaxgear analyze {name}     shows the pair without modification and with the tip reliefs of the values below
@@ -32,15 +35,14 @@ title = "{title}"
 teeth = {pinion}
 module = {module!r}
 face_width = {face_width!r}             # mm
-{hand}# profile_shift = 0.0           # x module
-# bore_diameter = 20.0          # mm; half the root diameter where it is not given
+{rack}{hand}{shift}# bore_diameter = 20.0          # mm; half the root diameter where it is not given
 # quality_class = 6             # ISO 1328-1, for the band in the charts
 
 [wheel]
 teeth = {wheel}
 module = {module!r}
 face_width = {face_width!r}
-
+{rack}{mate_shift}
 # [pair]
 # center_distance = {distance:.3f}     # mm; without backlash where it is not given
 # backlash = 50.0               # um on the line of action, of helical gears normal to the flanks
@@ -73,6 +75,10 @@ curve = "parabolic"
 """
 _HAND = "helix_angle = {angle!r}   # deg, positive for a right hand; the wheel has the other\n"
 _SPUR = "# helix_angle = 15.0            # deg, positive for a right hand; the wheel has the other\n"
+_RACK = "pressure_angle = {angle!r}         # deg\n"
+_FILLET = "root_radius = {radius:.4f}          # x module, c_P / (1 - sin(alpha)) of ISO 53\n"
+_SHIFT = "profile_shift = {shift!r}          # x module\n"
+_NO_SHIFT = "# profile_shift = 0.0           # x module\n"
 _SPEED = "speed = {speed!r}                # rpm of the pinion\n"
 _NO_SPEED = "# speed = 1500.0                # rpm of the pinion, for temperatures, film and loss\n"
 
@@ -86,6 +92,8 @@ def write_starter(
     face_width: float,
     speed: float | None,
     helix_angle: float = 0.0,
+    pressure_angle: float = 20.0,
+    profile_shift: tuple[float, float] = (0.0, 0.0),
 ) -> GearPair:
     """Writes a commented design file of a pair, which `jaxgear analyze` and `jaxgear optimize` take as it is.
 
@@ -97,6 +105,8 @@ def write_starter(
         face_width: of both gears [mm].
         speed: of the pinion [rpm]; None for none.
         helix_angle: of the pinion [deg].
+        pressure_angle: of the basic rack [deg]; below 20 degrees with the root radius of ISO 53 for its clearance.
+        profile_shift: of pinion and wheel [x module].
 
     Returns:
         the pair.
@@ -114,13 +124,12 @@ def write_starter(
     if speed is not None:
         check("new", "speed", speed, "rpm", low=0.0, open_low=True)
     compile_quickly()
-    width, hands = real(face_width), (helix_angle, -helix_angle)
-    pinion, wheel = (
-        Gear(real(count), real(module), face_width=width, helix_angle=real(hand)) for count, hand in zip(teeth, hands)
-    )
-    pair = GearPair(pinion, wheel)
+    pair = starter_pair(teeth, module, face_width, helix_angle, pressure_angle, profile_shift)
     rule = iso_relief(pair, torque)
-    amount, length = float(rule.amount), float(rule.length)
+    amount, length = float(rule.amount), max(float(rule.length), _SHORTEST * module)
+    rack = "" if pressure_angle == _PRESSURE_ANGLE else _RACK.format(angle=pressure_angle)
+    rack += _FILLET.format(radius=float(pair.pinion.root_radius)) if pressure_angle < _PRESSURE_ANGLE else ""
+    shifts = [_SHIFT.format(shift=shift) if shift else _NO_SHIFT for shift in profile_shift]
     text = _TEXT.format(
         name=path.name,
         title=f"{teeth[0]}/{teeth[1]} pair, module {module:g} mm",
@@ -130,6 +139,9 @@ def write_starter(
         face_width=face_width,
         distance=float(pair.working_center_distance),
         torque=torque,
+        rack=rack,
+        shift=shifts[0],
+        mate_shift=shifts[1] if profile_shift[1] else "",
         hand=_HAND.format(angle=helix_angle) if helix_angle else _SPUR,
         speed=_NO_SPEED if speed is None else _SPEED.format(speed=speed),
         amount=amount,
@@ -142,6 +154,39 @@ def write_starter(
     with writing(path):
         write_durably(path, lambda file: file.write(lined.encode("utf-8")))
     return pair
+
+
+def starter_pair(
+    teeth: tuple[int, int],
+    module: float,
+    face_width: float,
+    helix_angle: float = 0.0,
+    pressure_angle: float = _PRESSURE_ANGLE,
+    profile_shift: tuple[float, float] = (0.0, 0.0),
+) -> GearPair:
+    """The pair of `write_starter`, with its arguments.
+
+    Raises:
+        ValueError: for gears that are not possible.
+    """
+    fillet: Any = None
+    if pressure_angle < _PRESSURE_ANGLE:
+        # of ISO 53: c_P / (1 - sin(alpha)), so that the rack is straight down to the addendum of the mate
+        radius = (_DEDENDUM - _ADDENDUM) / (1 - np.sin(np.deg2rad(pressure_angle)))
+        fillet = real(np.floor(1e4 * radius) / 1e4)
+    pinion, wheel = (
+        Gear(
+            real(count),
+            real(module),
+            real(pressure_angle),
+            real(shift),
+            face_width=real(face_width),
+            helix_angle=real(hand),
+            root_radius=fillet,
+        )
+        for count, shift, hand in zip(teeth, profile_shift, (helix_angle, -helix_angle))
+    )
+    return GearPair(pinion, wheel)
 
 
 def write_design(

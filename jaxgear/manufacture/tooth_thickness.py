@@ -246,6 +246,21 @@ def _check_near(owner: str, name: str, value: Array, nominal: Scalar, gear: Gear
         check(owner, name, value, "mm", low=float(middle - pitch), high=float(middle + pitch))
 
 
+def _check_spanned(gear: Gear, measured: Array, teeth: Given) -> None:
+    """Refuses a span that is that of another number of teeth."""
+    known = [concrete(each) for each in (measured, teeth, _span(_without_allowance(gear), teeth), gear.base_pitch)]
+    if any(each is None for each in known):
+        return
+    size, over, nominal, transverse = (float(np.max(each)) for each in known if each is not None)
+    pitch = transverse * float(jnp.cos(gear.base_helix_angle))
+    meant = over + round((size - nominal) / pitch)
+    if meant != over and meant >= 1:
+        raise ValueError(
+            f"ToothThickness: teeth_spanned = {over:g} does not go with span = {size:.7g} mm: the rack makes "
+            f"{nominal:.6g} mm over {over:g} and {nominal + (meant - over) * pitch:.6g} mm over {meant:g} teeth"
+        )
+
+
 Limits = Float[Array, "..."]  # one number, or lower and upper limit
 
 # By how much a tooth may come out thicker than without allowance [um]: a drawing rounds its lengths to a micrometre,
@@ -300,6 +315,7 @@ class ToothThickness(Checked):
         if (measured := self.span) is not None:
             teeth = self.teeth_spanned
             assert teeth is not None  # or it would not have been made
+            _check_spanned(gear, measured, teeth)
             of = partial(allowance_of_span, gear, teeth), partial(span, _without_allowance(gear), teeth)
             return _named("span", lambda: _rounded(measured, *of), teeth_spanned=teeth)
         if (over := self.over_balls) is not None:

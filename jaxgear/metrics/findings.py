@@ -43,6 +43,9 @@ LIMITS = {
         0.0, 1.0, "", "the load concentrates beside it: take resolution.slices = 9"
     ),
     "tip edge radius in modules": Usual(0.0, 0.2, "", "usual tip edge radii are 0.01 to 0.1 modules"),
+    "roll length between the form circle and the tip of the mate": Usual(
+        -1e-6, np.inf, "mm", "the mate's tip reaches below the form circle: the path of contact begins there"
+    ),
     "least backlash": Usual(-0.1, np.inf, "um", "the thickest teeth within the tolerances have no backlash"),
     "coefficient of friction": Usual(0.0, 0.5, "", "lubricated gears 0.03 to 0.12, dry steel 0.4 to 0.6"),
     "coefficient of friction of the oil": Usual(
@@ -232,6 +235,8 @@ def _numbers(cycle: MeshCycle):
             ("bore to root diameter", where, gear.bore_radius / gear.root_circle_radius),
             ("tip edge radius in modules", where, gear.edge_radius / gear.module),
         ]
+        form = getattr(cycle.margins, f"{where}_form_clearance")
+        gears.append(("roll length between the form circle and the tip of the mate", where, form))
     module, stress = pair.pinion.module, nominal_root_stress(cycle)
     in_stress = cycle.kinematics.plane == "stress"
     name = "face width in modules, plane stress" if in_stress else "face width in modules"

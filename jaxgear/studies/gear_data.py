@@ -10,6 +10,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ..geometry import Gear, GearPair, PathOfContact, diameter, margins, outline, path_of_contact
+from ..geometry.gear import has_full_radius
 from ..io import DesignFile
 from ..io.tolerance_table import quality_classes
 from ..manufacture import measures
@@ -210,12 +211,18 @@ def mounting(file: DesignFile) -> str:
     for name, gear in (("pinion", file.pair().pinion), ("wheel", file.pair().wheel)):
         guess = "" if gear.bore_diameter is not None else " (half the root diameter, as none is given)"
         texts.append(f"{name} {float(shape[name]['bore_diameter_mm']):.4g} mm{guess}")
+    full = [
+        f"{name} {float(gear.root_radius):.4g} x module"
+        for name, gear in (("pinion", file.pair().pinion), ("wheel", file.pair().wheel))
+        if has_full_radius(gear)
+    ]
+    rack = f"; root radius: {', '.join(full)} (full radius of the rack)" if full else ""
     pair = shape["pair"]
     mounted = f"centre distance {float(pair['center_distance_mm']):.6g} mm"
     helical = "normal_backlash_um" in pair  # as pair.backlash has it
     name, where = ("normal_backlash_um", "normal to the flanks") if helical else (_BACKLASH, "on the line of action")
     backlash = round(float(pair[name]), 3) + 0.0  # rounding leaves no -0
-    return f"bores: {', '.join(texts)}; {mounted}, backlash {where} {backlash:g} um"
+    return f"bores: {', '.join(texts)}; {mounted}, backlash {where} {backlash:g} um{rack}"
 
 
 @program

@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ...geometry import Gear, GearPair, check_spur
-from ...numerics import AbstractSpring, Checked, concrete, program
+from ...numerics import AbstractSpring, Checked, check, concrete, program
 from ..assembly import AbstractCompliance, Outside, Structures, between_planes, with_edge
 from ..hertz import ContactGeometry, DepthReferenced
 from ..plane import (
@@ -115,6 +115,9 @@ def _local(table: GearTable, load: ToothLoad, plane: Plane) -> Float[Array, "pai
     return scale.value * (table.weights(load.roll_length * scale.length) @ table.local)
 
 
+_INCOMPRESSIBLE = 0.5
+
+
 def finite_element_compliance(
     pair: GearPair,
     plane: PlaneState = "auto",
@@ -150,6 +153,9 @@ def finite_element_compliance(
         gear: Gear = getattr(pair, name)
         if any(concrete(leaf) is None for leaf in jax.tree.leaves(gear)):
             raise ValueError(f"finite_element_compliance: pair: {name} is traced, must be of concrete numbers")
+        # elements of displacements lock in plane strain
+        ratio = gear.material.poisson_ratio
+        check("finite_element_compliance", "poisson_ratio", ratio, "", high=_INCOMPRESSIBLE, open_high=True)
         tables[name] = _tables(gear, plane, None if path is None else Path(path), folder)
     return TabulatedCompliance(pinion=tables["pinion"], wheel=tables["wheel"], plane=plane)
 
