@@ -175,7 +175,7 @@ def test_every_contact_leaves_its_wear_where_it_is(mesh, place):
 
 
 def test_contacts_on_a_slope_wear_the_flank_to_which_they_have_slid():
-    """A relief lets contacts of the pinion's tip slide to where it begins: farther down its flank, up that of the wheel."""
+    """A relief lets contacts of the tip slide to where it begins: farther down its flank, up that of the wheel."""
     mesh = prepare(pair_of(20, 30), resolution=SLIDING)
     options = {"pinion": jg.TipRelief(30.0, 3.0, jg.Linear()), "wheel": None, "deviation": None, "points": POINTS}
     case = case_of("wear", mesh, TORQUE, coefficient=COEFFICIENT, **options)
