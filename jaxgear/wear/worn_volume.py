@@ -49,8 +49,9 @@ from ..numerics import Given, Numbers, check, over_slices, program, real, safe_d
 Scalar = Float[Array, ""]
 Load = Float[Array, "pairs slices positions"]
 
-# Places along the piece of a position. On a grid coarser than a step the depth changes by 1e-4 with twice as many.
-_PLACES = 8
+# Places along the piece of a position, and across a contact that has a width: four across it leave steps on the flank
+# where the load sets in.
+_PLACES, _ACROSS = 4, 12
 # middle of every part of a piece, and its ends
 _MIDDLES, _ENDS = (np.arange(_PLACES) + 0.5) / _PLACES - 0.5, np.arange(_PLACES + 1) / _PLACES - 0.5
 
@@ -79,7 +80,7 @@ class Deposit(eqx.Module):
         lowest, highest: how far contacts may move from their nominal places towards the pinion tip [mm].
         full_load: line load of one pair that carries all [N/mm].
         inclination: cos(beta_b), depth normal to the flank over that in the transverse section.
-        nodes: points across the contact.
+        nodes: places across the contact.
     """
 
     roll_length: Float[Array, "gears points"]
@@ -147,7 +148,7 @@ def deposit(mesh: Mesh, torque: Scalar, points: int) -> Deposit:
         highest=place.highest,
         full_load=1e3 * torque / (mesh.pair.pinion.base_radius * mesh.pair.face_width),
         inclination=jnp.cos(mesh.pair.pinion.base_helix_angle),
-        nodes=mesh.resolution.contact_nodes,
+        nodes=1 if mesh.resolution.contact_nodes == 1 else _ACROSS,
     )
 
 
