@@ -178,6 +178,9 @@ def test_50_50_tip_corners_within_the_pressure_that_the_study_allows():
         assert study[f"{name}_wheel_fit"] < 1.0
         assert np.argmax(study[f"{name}_relief"]) == pytest.approx(200, abs=10)
     assert study["type 1_ppte"] < study["equation alone_ppte"]
+    # what type 2 ends with is the work of the iteration, not of its start
+    start, *_, last = study["type 2_pressure_over_steps"]
+    assert start < last
     said = "\n".join(importlib.import_module("examples.reproduce_50_50_study").pressures(study))  # after it has run
     assert "equation alone: " in said and said.count("above the limit") == 1 and said.count("within the limit") == 2
     for name, safety in (("type 1", "1.25"), ("type 2", "1.74")):
