@@ -103,7 +103,7 @@ def test_30_30_wear_has_the_trends_of_the_study():
     assert (np.diff(te, axis=1) > 0).all() and (error < 0.02 * (1 + depth)).all()
     assert (np.diff(stiffness[0]) < 0).all()
     relieved = stiffness[3]
-    assert np.ptp(relieved[:3]) < 1e-6 * relieved[0]
+    assert np.ptp(relieved[:2]) < 1e-6 * relieved[0]
     # stiffest once the pair is on: the wear that follows takes off some of what it carries, on any grid
     most = relieved.argmax()
     assert (np.diff(relieved[: most + 1]) > -1e-6 * relieved[0]).all() and relieved[most] > 1.01 * relieved[0]

@@ -99,7 +99,7 @@ class Deposit(eqx.Module):
     def arcs(self, line_load: Load, shift: Contact) -> Float[Array, "gears pairs slices positions places nodes"]:
         """Where contacts under line loads [N/mm] that have shifted [mm] leave their wear: arcs from the base circle."""
         moved = _along_pieces(jnp.clip(self.beyond + shift, self.lowest, self.highest))
-        centre = self.nominal + _first(_TOWARDS_PINION_TIP.astype(moved.dtype), 5) * moved[None]
+        centre = self.nominal + _first(jnp.asarray(_TOWARDS_PINION_TIP, moved.dtype), 5) * moved[None]
         share = safe_sqrt(jnp.minimum(safe_divide(line_load, self.full_load), 1.0))
         across = _last([node.place for node in contact_nodes(self.nodes)], 5, moved.dtype)
         arc = centre[..., None] + ((self.half_width * share)[..., None, None] * across)[None]
@@ -157,7 +157,7 @@ def _first(values: Array, ndim: int) -> Array:
     return values.reshape(-1, *[1] * (ndim - 1))
 
 
-def _last(values: Sequence[float], ndim: int, dtype: np.dtype) -> Array:
+def _last(values: Sequence[float] | np.ndarray, ndim: int, dtype: np.dtype) -> Array:
     """Values along the last one of many axes."""
     return jnp.asarray(values, dtype).reshape(*[1] * (ndim - 1), -1)
 
