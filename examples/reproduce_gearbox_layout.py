@@ -11,7 +11,7 @@ gears are helical: this spur gearbox is made up in its manner, and its trends ar
     good foundation                                     the same flank lines; a bad one needs other slopes, no other C_b
     PPTE and loss by step 3                             -50 and -40 %, -60 and -25 %; no contact shock
 
-Run it: `python examples/reproduce_gearbox_layout.py`, about a minute; `--fast` for a third of the variants.
+Run it: `python examples/reproduce_gearbox_layout.py`; `--fast` for a third of the variants.
 """
 
 import jax
@@ -165,8 +165,7 @@ def draw(found):
         plot.save(np.ravel(axes)[0].figure, folder / f"reproduce_gearbox_layout_step_{step}.png")
     made = found["profiles"]["low speed", "bad foundation"]
     rows, names = made.radar_variants()
-    results = "ppte", "effective_contact_ratio", "mesh_loss_factor", "max_flank_pressure"
-    axes = plot.radar(made.table.values(*results), rows, names)
+    axes = plot.radar(made.radar_table(), rows, names)
     plot.save(np.ravel(axes)[0].figure, folder / "reproduce_gearbox_layout_profiles.png")
 
 

@@ -122,7 +122,7 @@ def test_the_worn_volume_is_that_of_the_forces_of_the_motion(mesh, natural):
     contact = solve_forces(mesh, jnp.asarray(force), removed_material(mesh, TORQUE, **FLANKS))
     carried = np.asarray(contact.line_load)[:, 0] * float(mesh.slice_width[0])
     np.testing.assert_allclose((carried * np.asarray(mesh.lever)).sum(axis=0), force, rtol=1e-10)
-    sliding = np.einsum("ij,pij->p", carried, np.asarray(place.sliding))
+    sliding = np.einsum("ij,pij->p", carried, np.asarray(place.sliding).sum(axis=-1)[:, :, 0])
     passages = 1e-3 * np.array([1.0, TEETH[0] / TEETH[1]])
     np.testing.assert_allclose(worn_volume(short)[-1], 1e6 * COEFFICIENT * passages[:, None] * sliding, rtol=1e-9)
     # Newton: over a cycle nothing is accelerated

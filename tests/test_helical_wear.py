@@ -38,7 +38,7 @@ def slid(mesh):
 
 
 def test_every_slice_slides_over_the_whole_path_of_contact(mesh, place):
-    contact, found = mesh.path_of_contact, np.asarray(place.sliding)[0]
+    contact, found = mesh.path_of_contact, np.asarray(place.sliding)[0].sum(axis=-1)
     np.testing.assert_allclose(found, slid(mesh), atol=1e-12)
     inverse = 1 / float(contact.pinion_base_radius) + 1 / float(contact.wheel_base_radius)
     whole = 0.5 * (float(contact.start) ** 2 + float(contact.end) ** 2) * inverse
@@ -48,7 +48,7 @@ def test_every_slice_slides_over_the_whole_path_of_contact(mesh, place):
 def test_an_even_load_wears_all_slices_by_the_formula(mesh, place):
     """k w |u1 - u2| / u normal to the flank, and as a modification over cos(beta_b), whatever the phase of a slice."""
     load = jnp.full(mesh.kinematics.contact_path.shape, 100.0)
-    depth = np.asarray(worn(load, jnp.full((2, 1, 1, 1), COEFFICIENT), place))[:, 0]
+    depth = np.asarray(worn(load, jnp.zeros_like(load), jnp.full((2, 1, 1, 1), COEFFICIENT), place))[:, 0]
     contact, length = mesh.path_of_contact, np.asarray(place.roll_length)
     at = length[0] - float(contact.pinion_pitch_roll_length), float(contact.wheel_pitch_roll_length) - length[1]
     exact = np.stack([wear.specific_sliding(contact, s)[gear] for gear, s in enumerate(at)])

@@ -417,7 +417,13 @@ def test_flank_lines_are_varied_together_with_the_profiles(monkeypatch):
         tried.update({row: design(dict(zip(plan.names, row))) for row in map(tuple, rows)})
         found = dict.fromkeys(results, np.ones(len(rows))) | dict(zip(plan.names, rows.T))
         found["ppte"] = np.abs(rows - np.array([10.0, 5.0, -4.0, 3.0])).sum(axis=1)
-        return SimpleNamespace(column=found.get)
+        # teeth meet too early without tip relief on the pinion
+        found["effective_contact_ratio"] = np.where(
+            rows[:, 0] > 0, 1.0, float(jg.path_of_contact(PAIR).contact_ratio) + 0.2
+        )
+        return SimpleNamespace(
+            column=found.get, values=lambda *names: {jg.quantities[name]: found[name] for name in names}
+        )
 
     monkeypatch.setattr(importlib.import_module("jaxgear.layout.profiles"), "sweep", table)
     mesh, lines = SimpleNamespace(pair=PAIR), (jg.LeadCrowning(1.0), jg.LeadSlope(2.0))
@@ -428,6 +434,10 @@ def test_flank_lines_are_varied_together_with_the_profiles(monkeypatch):
     for wheel in (tried[10.0, 5.0, -4.0, 3.0][1], lines[1] + found.profiles[1]):
         removed = removed_at(side, wheel, jnp.reshape(side.pitch_roll_length, (1,)), ends)
         np.testing.assert_allclose(removed[:, 0], [-1.0 + 2.0 + 3.0, 1.0 - 2.0 + 3.0], atol=1e-9)
+    radar = found.radar_table()
+    (shock,) = (values for of, values in radar.items() if of.name == "contact_shock" and of.better == "smaller")
+    np.testing.assert_allclose(shock, [0.2] * 5 + [0.0] * 4, atol=1e-12)
+    assert "effective_contact_ratio" not in [of.name for of in radar] and len(radar) == 4
     assert found.radar_variants()[1][1] == "pinion 10, wheel 5 µm, slope -4 µm, crowning +3 µm"
 
 

@@ -251,8 +251,8 @@ def test_the_radar_has_the_lives_of_both_gears(file, monkeypatch):
     profile = SimpleNamespace(
         table=SimpleNamespace(
             column=lambda name: np.asarray([1.2, 1.0, np.nan]),
-            values=lambda *names: {quantities[name]: np.ones(3) for name in names},
         ),
+        radar_table=lambda: {quantities["ppte"]: np.ones(3)},
         radar_variants=lambda: ([0, 1], ["no profile modification", "best"]),
     )
     layout = SimpleNamespace(after={"maximum": None}, cases=[])

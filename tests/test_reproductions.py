@@ -103,17 +103,16 @@ def test_30_30_wear_has_the_trends_of_the_study():
     assert (np.diff(te, axis=1) > 0).all() and (error < 0.02 * (1 + depth)).all()
     assert (np.diff(stiffness[0]) < 0).all()
     relieved = stiffness[3]
-    assert np.ptp(relieved[:3]) < 1e-6 * relieved[0]
+    assert np.ptp(relieved[:2]) < 1e-6 * relieved[0]
     # stiffest once the pair is on: the wear that follows takes off some of what it carries, on any grid
     most = relieved.argmax()
     assert (np.diff(relieved[: most + 1]) > -1e-6 * relieved[0]).all() and relieved[most] > 1.01 * relieved[0]
     assert relieved[-1] > relieved[0]
-    # nothing brings it back behind the largest relief, and the driver wears most at its root
-    assert np.ptp(stiffness[-1]) < 1e-6 * stiffness[-1, 0]
-    # until, many deflections deep, a place above it is as deep: by 0.3 % on 64 positions
+    # behind the largest relief nothing brings it back for most of the life
+    assert np.ptp(stiffness[-1, : len(relieved) // 2]) < 1e-6 * stiffness[-1, 0]
+    # the driver wears most near its root, from which contacts slide away as it deepens
     root = np.array(study["worn_root"][0])
-    np.testing.assert_allclose(root[:-1], depth[0, :-1], rtol=1e-9)
-    np.testing.assert_allclose(root[-1], depth[0, -1], rtol=5e-3)
+    assert (root[1:] > 0.65 * depth[0, 1:]).all()
 
 
 def test_30_30_trends_are_compared():
@@ -127,7 +126,8 @@ def test_30_30_trends_are_compared():
 
 
 def test_30_30_after_wear():
-    """Over amount and length of the relief, and what the stiffness at A rises by: most where wear follows no load."""
+    """Over amount and length of the relief, and what the stiffness at A rises by: most where contacts are points that
+    stay at their nominal places, and where wear follows no load."""
     study = found("reproduce_30_30_20_30_study")
     module = importlib.import_module("examples.reproduce_30_30_20_30_study")
     (new, worn), (te, worn_te) = module.after_wear(study, "worn")
@@ -137,8 +137,12 @@ def test_30_30_after_wear():
     (new, worn), _ = module.after_wear(study, "worn_length")
     assert np.ptp(new[1:]) < 1e-3 * new[-1] and np.ptp(worn[1:]) < 5e-3 * worn[-1]
     assert module.deviation(study, "worn_other") < module.deviation(study, "worn") < 10.0
-    *others, kept = study["recovery"].values()
-    assert max(others) < 3.0 < 6.0 < kept < 15.1
+    default, other, alone, point, point_alone, light, heavy, kept = study["recovery"].values()
+    assert max(default, other, light, heavy) < 3.0 < point < point_alone < kept < 15.1
+    assert default < alone < point_alone and point_alone > 6.0
+    # what the pair at A carries where both wear alike, half of whose stiffening is left by what the pairs share
+    share = 1 / (1 + study["faster_at_A"])
+    assert share / (1 - share) == pytest.approx(0.164, abs=0.002) and point_alone < 0.55 * 100 * share / (1 - share)
     # corners bring the second pair in before A; behind the relief they do not touch
     extended, alone = np.array(study["worn_cycles"])[[0, 3]], np.array(study["path_alone_cycles"])
     carried = extended[0, 1, 0] > 1.01 * alone[0, 1, 0]
@@ -178,6 +182,9 @@ def test_50_50_tip_corners_within_the_pressure_that_the_study_allows():
         assert study[f"{name}_wheel_fit"] < 1.0
         assert np.argmax(study[f"{name}_relief"]) == pytest.approx(200, abs=10)
     assert study["type 1_ppte"] < study["equation alone_ppte"]
+    # what type 2 ends with is the work of the iteration, not of its start
+    start, *_, last = study["type 2_pressure_over_steps"]
+    assert start < last
     said = "\n".join(importlib.import_module("examples.reproduce_50_50_study").pressures(study))  # after it has run
     assert "equation alone: " in said and said.count("above the limit") == 1 and said.count("within the limit") == 2
     for name, safety in (("type 1", "1.25"), ("type 2", "1.74")):

@@ -300,8 +300,8 @@ def contacts(pair: GearPair, contact: PathOfContact, path: Float[Array, "..."], 
     outside = contact.start - path, path - contact.end
     at_form = contact.start_shortened > 0, contact.end_shortened > 0
     tips = (  # of the gear whose tip is at that end
-        (contact.wheel_roll_length(contact.start), pair.wheel.tip_edge_radius),
-        (contact.pinion_roll_length(contact.end), pair.pinion.tip_edge_radius),
+        (contact.wheel_roll_length(contact.start), pair.wheel.edge_radius),
+        (contact.pinion_roll_length(contact.end), pair.pinion.edge_radius),
     )
     # the edge of an undercut passes the tip of the mate about as far outside the path as this is shortened
     reaches = (REACH * contact.base_pitch + less for less in (contact.start_shortened, contact.end_shortened))

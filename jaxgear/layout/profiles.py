@@ -24,6 +24,7 @@ from ..microgeometry import AbstractCurve, AbstractModification, ProfileCrowning
 from ..numerics import Callback, Given, check, real
 from ..sizing import long_relief_length
 from ..sweeps import SweepTable, VariantList, sweep
+from ..sweeps.columns import described
 from .flank_line import FlankLine
 
 Kind = Literal["tip_relief", "profile_crowning"]
@@ -86,6 +87,19 @@ class ProfileLayout:
     def without_shock(self) -> np.ndarray:
         """Whether the teeth of every variant meet on the theoretical path of contact only."""
         return self.shock <= _SHOCK
+
+    def radar_table(self) -> dict[Any, np.ndarray]:
+        """Results for `plot.radar`, by what they are; contact shock in place of the effective contact ratio.
+
+        The study reads the shock off that ratio: what it has beyond the theoretical one is too much, not good.
+        """
+        shock = described("contact_shock", "base pitches", meaning="contact beyond the path of contact", form=".3f")
+        values = self.table.values
+        return {
+            **values("ppte"),
+            shock: np.maximum(self.shock, 0.0),
+            **values("mesh_loss_factor", "max_flank_pressure"),
+        }
 
     def change(self, name: str) -> float:
         """Of a result from no profile modification to the variant that was chosen, relative [%]."""

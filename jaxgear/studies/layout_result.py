@@ -333,8 +333,7 @@ class LayoutResult(AbstractStudyResult):
             axes["lead_chart"] = plot.lead_chart(mesh, self.designs())
         if self.profile is not None:
             rows, names = self.profile.radar_variants()
-            results = "ppte", "effective_contact_ratio", "mesh_loss_factor", "max_flank_pressure"
-            values: dict[Any, np.ndarray] = {**self.profile.table.values(*results)}
+            values = self.profile.radar_table()
             for gear, hours in zip(("pinion", "wheel"), self.lives(self.profile).values()):
                 if np.isfinite(hours[rows]).all():
                     values[described(f"{gear}_life", "h", better="larger")] = hours

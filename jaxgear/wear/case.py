@@ -244,7 +244,7 @@ class Case(eqx.Module):
         coefficient = self.law(cycle)
         # a function may give anything: no flank is known that NaN or a negative coefficient has worn
         valid = jnp.all(coefficient >= 0)
-        return worn(cycle.line_load, coefficient, place), status_of({Status.OUT_OF_VALIDITY: ~valid})
+        return worn(cycle.line_load, cycle.shift, coefficient, place), status_of({Status.OUT_OF_VALIDITY: ~valid})
 
     def _dynamic_rate(
         self, cycle: MeshCycle, motion: SteadyForce, removed: RemovedMaterial, place: Deposit

@@ -11,10 +11,10 @@ with the weight of the Hertzian pressure, as the contact in turn meets the flank
 the flank, so that the volume of the depth is the worn volume to rounding, and equal pieces of sliding leave no ripple
 of the positions.
 
-A contact is as wide as its own load makes it, up to the full load of one pair: its wear is a mixture of those over a
-few shares of that width, by Bernstein polynomials, which are smooth and keep the mean width. What would lie beyond an
-end of the flank is folded back, so that an even load wears evenly up to the end. That the contact slides down a slope,
-by less than half its width on usual reliefs, is left out.
+A contact is as wide as its own load makes it, up to the full load of one pair. It wears both flanks where it is: down
+the slope of a relief it shifts along them, by the same arc on either gear (`RemovedMaterial.shift`), between positions
+linearly. To first order the flanks slide past each other there as they do at the nominal contact. What would lie beyond
+an end of the flank is folded back, so that an even load wears evenly up to the end.
 
 While one pair of teeth passes through the mesh, every point of flank i is in contact over the distance 2 a of the
 rolling, slides past its mate by 2 a |u1 - u2| / u_i, and wears by
@@ -32,7 +32,7 @@ References:
     A. Flodin, S. Andersson, Simulation of mild wear in spur gears, Wear 207 (1997) 16-23.
 """
 
-from math import comb
+from collections.abc import Sequence
 
 import equinox as eqx
 import jax
@@ -47,43 +47,67 @@ from ..geometry import PathOfContact
 from ..numerics import Given, Numbers, check, over_slices, program, real, safe_divide, safe_sqrt
 
 Scalar = Float[Array, ""]
+Load = Float[Array, "pairs slices positions"]
 
-# Places along the piece of a position. On a grid coarser than a step the depth changes by 1e-4 with twice as many.
-_PLACES = 8
-
-# widths from none to that of the full load, evenly spaced, over which it is known where contacts leave their wear
-_WIDTHS = 4
+# Places along the piece of a position, and across a contact that has a width: four across it leave steps on the flank
+# where the load sets in.
+_PLACES, _ACROSS = 4, 12
+# middle of every part of a piece, and its ends
+_MIDDLES, _ENDS = (np.arange(_PLACES) + 0.5) / _PLACES - 0.5, np.arange(_PLACES + 1) / _PLACES - 0.5
 
 # of the worn material: from contact on the flanks, and of tip corners on the mate's flank
 PARTS = "flank", "corner"
 
 
+_TOWARDS_PINION_TIP = np.array([1.0, -1.0])  # which way along the flanks of pinion and wheel the roll lengths grow
+
+Contact = Float[Array, "pairs #slices positions"]
+
+
 class Deposit(eqx.Module):
     """Where contacts wear the flanks of pinion and wheel, in this order along the axis gears.
-
-    Of helical gears what has the axes (pairs, positions) has (pairs, slices, positions).
 
     Attributes:
         roll_length: of the grid points, from the start of the active profile to the tip [mm], shape (gears, points).
         arc: of the flank that belongs to every point [mm], shape (gears, points).
-        sliding: of every position, on the flank and of tip corners [mm], shape (parts, pairs, positions).
-        spreads: sliding by the points where contacts leave their wear [mm], from those without width to those of the
-            full load, shape (widths, gears, parts, points, pairs, positions).
+        base_radius: [mm], shape (gears,).
+        nominal: arc of the flanks from the base circle to the nominal contact [mm], at the places along the piece of
+            every position, shape (gears, pairs, 1, positions, places), of helical gears with slices.
+        sliding: along those places, on the flank and of tip corners [mm], shape (parts, pairs, 1 or slices, positions,
+            places).
+        half_width: of contacts under the full load [mm], shape (pairs, 1 or slices, positions), as what follows.
+        beyond: of the virtual centre of the contact beyond the corner that touches [mm]; zero on the path.
+        lowest, highest: how far contacts may move from their nominal places towards the pinion tip [mm].
         full_load: line load of one pair that carries all [N/mm].
         inclination: cos(beta_b), depth normal to the flank over that in the transverse section.
+        nodes: places across the contact.
     """
 
     roll_length: Float[Array, "gears points"]
     arc: Float[Array, "gears points"]
-    sliding: Float[Array, "parts pairs *own positions"]
-    spreads: Float[Array, "widths gears parts points pairs *own positions"]
+    base_radius: Float[Array, " gears"]
+    nominal: Float[Array, "gears pairs #slices positions places"]
+    sliding: Float[Array, "parts pairs #slices positions places"]
+    half_width: Contact
+    beyond: Contact
+    lowest: Contact
+    highest: Contact
     full_load: Scalar
     inclination: Scalar
+    nodes: int = eqx.field(static=True)
 
-    def shares(self, line_load: Float[Array, "*contacts"]) -> Float[Array, "widths *contacts"]:
-        """What each of the `spreads` counts for in contacts under line loads [N/mm], as wide as the root of these."""
-        width, most = safe_sqrt(jnp.minimum(safe_divide(line_load, self.full_load), 1.0)), _WIDTHS - 1
-        return jnp.stack([comb(most, i) * width**i * (1 - width) ** (most - i) for i in range(_WIDTHS)])
+    def arcs(self, line_load: Load, shift: Contact) -> Float[Array, "gears pairs slices positions places nodes"]:
+        """Where contacts under line loads [N/mm] that have shifted [mm] leave their wear: arcs from the base circle."""
+        moved = _along_pieces(jnp.clip(self.beyond + shift, self.lowest, self.highest))
+        centre = self.nominal + _first(jnp.asarray(_TOWARDS_PINION_TIP, moved.dtype), 5) * moved[None]
+        share = safe_sqrt(jnp.minimum(safe_divide(line_load, self.full_load), 1.0))
+        across = _last([node.place for node in contact_nodes(self.nodes)], 5, moved.dtype)
+        arc = centre[..., None] + ((self.half_width * share)[..., None, None] * across)[None]
+        # the contact ends with the flank: the share that would lie beyond wears what is left of it
+        first, last = (_first(_arc(self.roll_length[:, end], self.base_radius), arc.ndim) for end in (0, -1))
+        return jnp.clip(
+            jnp.where(arc < first, 2 * first - arc, jnp.where(arc > last, 2 * last - arc, arc)), first, last
+        )
 
 
 def grid(mesh: Mesh, points: int) -> Float[Array, "gears points"]:
@@ -103,37 +127,56 @@ def arcs(roll_length: Float[Array, " points"], base_radius: Scalar) -> Float[Arr
 @program
 def deposit(mesh: Mesh, torque: Scalar, points: int) -> Deposit:
     """The deposit of a mesh under a torque on the pinion [N m], which tells how wide its contacts are."""
-    contact, path, dtype = mesh.path_of_contact, mesh.kinematics.contact_path, mesh.slice_width.dtype
+    contact, path, dtype = mesh.path_of_contact, over_slices(mesh.kinematics.contact_path), mesh.slice_width.dtype
     step = contact.base_pitch / mesh.resolution.positions
-    # middle of every part of a piece, and its ends
-    middles, ends = (np.arange(_PLACES) + 0.5) / _PLACES - 0.5, np.arange(_PLACES + 1) / _PLACES - 0.5
 
     def along(places: np.ndarray) -> Array:
-        return path[..., None] + step * jnp.asarray(places, dtype).reshape(*[1] * path.ndim, -1)
+        return path[..., None] + step * _last(places, 4, dtype)
 
-    sliding = _sliding(mesh, along(ends))
-    at = contacts(mesh.pair, contact, along(middles))
+    at, bases = contacts(mesh.pair, contact, along(_MIDDLES)), [side.base_radius for side in mesh.sides]
     rolls = at.pinion_roll_length, at.wheel_roll_length
-    half_width = place_of(mesh, torque).half_width.reshape(path.shape)[..., None]
-    lengths = grid(mesh, points)
+    knots, place = grid(mesh, points), place_of(mesh, torque)
+    return Deposit(
+        roll_length=knots,
+        arc=jnp.stack([arcs(of, base) for of, base in zip(knots, bases)]),
+        base_radius=jnp.stack(bases),
+        nominal=jnp.stack([_arc(roll, base) for roll, base in zip(rolls, bases)]),
+        sliding=_sliding(mesh, along(_ENDS)),
+        half_width=place.half_width,
+        beyond=place.beyond,
+        lowest=place.lowest,
+        highest=place.highest,
+        full_load=1e3 * torque / (mesh.pair.pinion.base_radius * mesh.pair.face_width),
+        inclination=jnp.cos(mesh.pair.pinion.base_helix_angle),
+        nodes=1 if mesh.resolution.contact_nodes == 1 else _ACROSS,
+    )
 
-    def over(width) -> Float[Array, "gears parts points pairs *own positions"]:
-        made = [
-            _spread(roll, width * half_width, sliding, knots, side.base_radius, mesh.resolution.contact_nodes)
-            for roll, side, knots in zip(rolls, mesh.sides, lengths)
-        ]
-        return jnp.stack(made)
 
-    spreads = jax.lax.map(over, jnp.linspace(0.0, 1.0, _WIDTHS, dtype=dtype))
-    arc = jnp.stack([arcs(knots, side.base_radius) for knots, side in zip(lengths, mesh.sides)])
-    full_load = 1e3 * torque / (mesh.pair.pinion.base_radius * mesh.pair.face_width)
-    inclination = jnp.cos(mesh.pair.pinion.base_helix_angle)
-    return Deposit(lengths, arc, jnp.sum(sliding, axis=-1), spreads, full_load, inclination)
+def _first(values: Array, ndim: int) -> Array:
+    """Values along the first one of many axes."""
+    return values.reshape(-1, *[1] * (ndim - 1))
+
+
+def _last(values: Sequence[float] | np.ndarray, ndim: int, dtype: np.dtype) -> Array:
+    """Values along the last one of many axes."""
+    return jnp.asarray(values, dtype).reshape(*[1] * (ndim - 1), -1)
+
+
+def _along_pieces(field: Contact) -> Float[Array, "pairs #slices positions places"]:
+    """A field of the contacts at the places along their pieces, linear from position to position."""
+    pairs, slices, positions = field.shape
+    # along the path: the last pair is the first there
+    line = jnp.swapaxes(field[::-1], 0, 1).reshape(slices, -1)
+    step = jnp.diff(line, prepend=line[:, :1], append=line[:, -1:])  # to every contact, and beyond the last one none
+    before, after = step[:, :-1, None], step[:, 1:, None]
+    places = _last(_MIDDLES, 3, field.dtype)
+    found = line[..., None] + jnp.where(places < 0, before, after) * places
+    return jnp.swapaxes(found.reshape(slices, pairs, positions, -1), 0, 1)[::-1]
 
 
 def _sliding(
-    mesh: Mesh, ends: Float[Array, "pairs *own positions ends"]
-) -> Float[Array, "parts pairs *own positions places"]:
+    mesh: Mesh, ends: Float[Array, "pairs #slices positions ends"]
+) -> Float[Array, "parts pairs #slices positions places"]:
     """Sliding between neighbouring ends [mm], on the flank and of tip corners."""
     contact = mesh.path_of_contact
     on_path = jnp.clip(ends, contact.start, contact.end)
@@ -150,28 +193,10 @@ def _sliding(
     return jnp.stack([jnp.diff(flank, axis=-1), jnp.abs(jnp.diff(corner, axis=-1))])
 
 
-def _spread(
-    roll, half_width, sliding, knots, base_radius, nodes: int
-) -> Float[Array, "parts points pairs *own positions"]:
-    """Sliding by the points of one grid."""
-    total = jnp.zeros((sliding.shape[0], *knots.shape, *roll.shape[:-1]), roll.dtype)
-    width, first, last = knots[1] - knots[0], _arc(knots[0], base_radius), _arc(knots[-1], base_radius)
-    for node in contact_nodes(nodes):
-        arc = _arc(roll, base_radius) + node.place * half_width
-        # the contact ends with the flank: the share that would lie beyond wears what is left of it
-        arc = jnp.clip(jnp.where(arc < first, 2 * first - arc, jnp.where(arc > last, 2 * last - arc, arc)), first, last)
-        place = jnp.clip(jnp.sqrt(2 * base_radius * arc), knots[0], knots[-1])
-        hat = jnp.maximum(1 - jnp.abs(place[None] - knots.reshape(-1, *[1] * place.ndim)) / width, 0.0)
-        total = total + node.mean * jnp.einsum("x...m,k...m->kx...", hat, sliding)
-    return total
-
-
-def _arc(roll_length: Float[Array, "..."], base_radius: Scalar) -> Float[Array, "..."]:
+def _arc(roll_length: Float[Array, "..."], base_radius: Float[Array, "..."]) -> Float[Array, "..."]:
     """Arc of an involute from the base circle [mm]."""
     return roll_length**2 / (2 * base_radius)
 
-
-Load = Float[Array, "pairs slices positions"]
 
 # A coefficient of 1 m2/N makes 1e6 mm2/N, and these times N/mm are 1e3 um each.
 UM_PER_LOAD = 1e9
@@ -213,17 +238,33 @@ def passage_depth(cycle: MeshCycle, coefficient: Numbers) -> tuple[Load, Load]:
 
 
 @program
-def worn(line_load: Load, coefficient: Given, place: Deposit) -> Float[Array, "gears parts slices points"]:
+def worn(
+    line_load: Load, shift: Contact, coefficient: Given, place: Deposit
+) -> Float[Array, "gears parts slices points"]:
     """Wear depth that one passage leaves on the grids of both flanks [um], on the flank and by tip corners.
 
     In the transverse section, as that of a modification.
 
     Args:
         line_load: [N/mm], shape (pairs, slices, positions).
+        shift: of the contacts, see `RemovedMaterial` [mm], shape (pairs, slices or 1, positions).
         coefficient: of wear [m2/N]; of every gear and contact, to be broadcast to (gears, pairs, slices, positions).
         place: where contacts wear the flanks.
     """
-    taken = UM_PER_LOAD * coefficient * line_load[None] / place.inclination
-    left = place.shares(line_load)[:, None] * jnp.broadcast_to(taken, (2, *line_load.shape))[None]
-    axes = "isj" if place.sliding.ndim == line_load.ndim + 1 else "ij"
-    return jnp.einsum(f"ugkx{axes},ugisj->gksx", place.spreads, left) / place.arc[:, None, None]
+    gears, slices, points = len(place.base_radius), line_load.shape[1], place.roll_length.shape[-1]
+    taken = jnp.broadcast_to(UM_PER_LOAD * coefficient * line_load[None] / place.inclination, (gears, *line_load.shape))
+    mean = _last([node.mean for node in contact_nodes(place.nodes)], 7, line_load.dtype)
+    left = (taken[None, ..., None] * place.sliding[:, None])[..., None] * mean
+    # between which points of the grid, and how far from the first of them
+    base, knots, next_knots = (_first(of, 6) for of in (place.base_radius, *place.roll_length.T[:2]))
+    step = next_knots - knots
+    at = jnp.clip((safe_sqrt(2 * base * place.arcs(line_load, shift)) - knots) / step, 0.0, points - 1)
+    cell = jnp.minimum(jax.lax.stop_gradient(at).astype(jnp.int32), points - 2)
+    ahead = at - cell.astype(at.dtype)
+    gear = _first(jnp.arange(gears, dtype=jnp.int32), 6)
+    face = jnp.arange(slices, dtype=jnp.int32).reshape(1, 1, -1, 1, 1, 1)
+    left = jnp.moveaxis(left, 0, -1)
+    depth = jnp.zeros((gears, slices, points, len(PARTS)), line_load.dtype)
+    depth = depth.at[gear, face, cell].add(left * (1 - ahead)[..., None])
+    depth = depth.at[gear, face, cell + 1].add(left * ahead[..., None])
+    return jnp.moveaxis(depth, -1, 1) / place.arc[:, None, None]

@@ -96,7 +96,8 @@ class OperatingCondition(NamedTuple):
         frequency: Omega, mesh frequency over omega_0.
         free: parameters of the relief that are optimized.
         curve: shape of the relief to start from.
-        goal: as the study puts it.
+        goal: as the study puts it; `dynamic_profile_modification` minimizes the amplitude everywhere, which is the
+            least velocity only as far as the motion has one harmonic.
     """
 
     name: str
