@@ -7,6 +7,7 @@ from typing import TypeVar
 import numpy as np
 
 from ..contact import Mesh, prepare
+from ..contact.mesh import fewer_slices, slices_left
 from ..numerics import whole
 from .goal import FEASIBLE, counted
 from .linear_model import Linearizer, LinearModel, NoObjective
@@ -38,8 +39,8 @@ def refined(record: Record, polish: Polish, positions: int | None) -> tuple[Reco
         positions: of the first finer mesh; None to stay.
 
     Returns:
-        the record of the finest mesh, with all that was spent, and by how much its objective changes at twice the
-        positions.
+        the record of the finest mesh, with all that was spent, and the change of its objective at twice the positions
+        and, of helical gears, with slices without end.
     """
     if positions is None:
         _kept_to_limits(record, polish)
@@ -54,7 +55,7 @@ def refined(record: Record, polish: Polish, positions: int | None) -> tuple[Reco
         _kept_to_limits(found, polish)
         record, now = found, np.asarray([[found.value]])
         values, violations = at_more_positions(found, found.point[None])
-        change = problem.objectives[0].sign * float(values[0, 0] - found.value)
+        change = problem.objectives[0].sign * (float(values[0, 0] - found.value) + _left_by_slices(found))
         return (found, change), fine_enough(now, np.asarray([found.violation]), values, violations)
 
     return on_finer_meshes("minimize", problem.mesh, positions, end_on)
@@ -117,6 +118,19 @@ def at_more_positions(record: Record, points: np.ndarray) -> tuple[np.ndarray, n
     models = [[LinearModel(problem, point, of) for of in both] for point, both in zip(points, finer)]
     values = [[twice.value] if len(problem.objectives) == 1 else twice.values for twice, _ in models]
     return np.asarray(values), np.asarray([four.violation for _, four in models])
+
+
+def _left_by_slices(record: Record) -> float:
+    """Estimate of what slices without end add to the objective of the best design, zero of spur gears."""
+    fewer, linearizer = fewer_slices(record.problem.mesh), record.linearizer
+    if fewer is None:
+        return 0.0
+    posed, point = record.problem.on(fewer), record.point[None]
+    record.spend(1)
+    if linearizer is None:
+        return float(slices_left(record.value, np.asarray(scores(posed, point).value).item()))
+    (found,) = linearizer.on(posed)(point)
+    return float(slices_left(record.value, LinearModel(posed, record.point, found).value))
 
 
 def _kept_to_limits(record: Record, polish: Polish) -> None:
