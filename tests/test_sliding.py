@@ -304,3 +304,11 @@ def test_points_across_the_contact_have_to_see_a_slope():
     with pytest.raises(ValueError, match="slide_steps = 1 needs contact_nodes >= 3, is 2"):
         jg.Resolution(contact_nodes=2, slide_steps=1)
     assert jg.Resolution(contact_nodes=1).chosen_slide_steps == 0 and jg.Resolution().chosen_slide_steps == 2
+
+
+def test_rounding_does_not_decide_where_a_contact_rests(mesh):
+    """Torques that differ in their last digits alone: a place that was tried before is level up to rounding."""
+    steep = jg.TipRelief(40.0, 2.5, jg.Linear())
+    found = jax.vmap(lambda torque: removed_material(mesh, torque, pinion=steep).amount)
+    amounts = np.asarray(found(200 * (1 + 1e-13 * jnp.arange(40))))
+    assert np.ptp(amounts, axis=0).max() < 1e-10  # um

@@ -15,7 +15,7 @@ from ..microgeometry import NoModification
 from ..report import Chapter, Table, figure, text, write_variants, write_workbook
 from ..studies import side_by_side as report
 from ..studies.comparison import Modifications
-from ..studies.evaluation import evaluate, grid_change, grid_lines, torques_of
+from ..studies.evaluation import evaluate, grid_change, grid_lines, grid_of, torques_of
 from ..studies.gear_data import gears
 from ..studies.results import save_figures
 from ..studies.summary_data import sizes, versions
@@ -139,8 +139,9 @@ def said_of_best(design: DesignFile, best: SweepTable, size: Resolution) -> tupl
     (cycle,) = over_torques(mesh, np.asarray([torque]), pinion=pinion, wheel=wheel)
     name = f"variant {best.column('variant')[0]} at {torque:g} N m"
     findings = findings_of(cycle, pinion=pinion, wheel=wheel, compliance=mesh.compliance)
-    grid = grid_lines(f"{size.positions} positions", {name: grid_change(mesh, cycle, pinion, wheel)})
-    return [*grid], [f"{report.WARNING}{name}: {finding}" for finding in findings]
+    grid = grid_of(mesh.resolution, helical=mesh.kinematics.helical)
+    lines = grid_lines(grid, {name: grid_change(mesh, cycle, pinion, wheel)})
+    return [*lines], [f"{report.WARNING}{name}: {finding}" for finding in findings]
 
 
 def _draw(

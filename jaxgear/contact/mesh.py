@@ -17,7 +17,7 @@ from ..geometry import GearPair, Margins, Outline, PathOfContact, explicit, marg
 from ..microgeometry import Flank
 from ..numerics import AbstractSpring, Given, SliceCoupling, changed, on_both, over_slices, program
 from ..numerics.programs import begin
-from .covering import check_cover, check_slices, closing, helical_slices, pairs_alternate, pairs_for
+from .covering import check_cover, closing, helical_slices, pairs_alternate, pairs_for
 from .face_coupling import check_modes, check_support, coupling_of, ends_together, slices_alike, spreading_of
 from .kinematics import Kinematics, Side, contacts, kinematics, sides
 from .resolution import Resolution
@@ -213,7 +213,8 @@ def prepare(
     Args:
         pair: gear pair, concrete or traced.
         compliance: compliance model; None for `default_compliance()`.
-        resolution: array sizes; None for `Resolution()`, of helical gears with the slices of `helical_slices`.
+        resolution: array sizes; None for `Resolution()`. Helical gears, which one slice cannot show, take
+            `helical_slices` where it has one.
         deflection: transmission error up to which the number of tooth pairs is chosen [um], shape (); it counts where
             `resolution.pairs` is None. None for 16 um per mm of module, at which root stresses are beyond 1000 MPa.
             Traced gears take four pairs whatever it is.
@@ -227,13 +228,13 @@ def prepare(
 
     Raises:
         ValueError: when the path of contact is longer than the pairs of the resolution can cover, or the compliance is
-            a table of other gears; for a support of other gears, or on a mesh whose slices are not coupled; for helical
-            gears on a single slice.
+            a table of other gears; for a support of other gears, or on a mesh whose slices are not coupled.
     """
     compliance = default_compliance() if compliance is None else compliance
     compliance.check(pair)
-    resolution = Resolution(slices=helical_slices(pair)) if resolution is None else resolution
-    check_slices(pair, resolution)
+    resolution = Resolution() if resolution is None else resolution
+    if resolution.slices == 1:
+        resolution = replace(resolution, slices=helical_slices(pair))
     automatic = resolution.pairs is None
     if automatic:
         resolution = replace(resolution, pairs=pairs_for(explicit(pair), deflection))
@@ -357,6 +358,7 @@ class Sizes(TypedDict, total=False):
     """Of arrays, in place of those of a mesh."""
 
     positions: int
+    slices: int
     pairs: int
 
 
@@ -379,6 +381,30 @@ def later(mesh: Mesh, share: float) -> Mesh:
     first = np.asarray(mesh.kinematics.first_phase) + share / mesh.resolution.positions
     moved = prepare_from(first, mesh.pair, mesh.compliance, mesh.resolution, mesh.support, mesh.even)
     return replace(moved, automatic=mesh.automatic, alternates=mesh.alternates)
+
+
+_GROUP = 3  # slices, that of the middle one of which can stand for all of them
+# Part of what a third of the slices changes that is taken as the error of all. Of an error of second order an eighth is
+# left; contacts set in more abruptly.
+_LEFT = 0.25
+
+
+def fewer_slices(mesh: Mesh) -> Mesh | None:
+    """The mesh of helical gears with every three slices at the phase of their middle, in arrays of the same shapes.
+
+    What that changes tells the error of the slices without another program, see `slices_left`. None for spur gears, all
+    slices of which are at one phase.
+    """
+    if not mesh.kinematics.helical:
+        return None
+    count = mesh.resolution.slices
+    middles = np.minimum(np.arange(count) // _GROUP * _GROUP + _GROUP // 2, count - 1)
+    return eqx.tree_at(_by_slice, mesh, jax.tree.map(lambda leaf: leaf[..., middles, :], _by_slice(mesh)))
+
+
+def slices_left(value: Given, of_fewer: Given) -> Given:
+    """Estimate of what slices without end would add to a value, from that of `fewer_slices`."""
+    return _LEFT * (value - of_fewer)
 
 
 def parts(mesh: Mesh, positions: int) -> list[Mesh]:
@@ -422,15 +448,24 @@ def _by_position(mesh: Mesh) -> list[Array | AbstractSpring]:
         coupled.append(mesh.coupling.scale)
     if mesh.coupling is not None and mesh.coupling.other is not None:
         coupled.append(mesh.coupling.other.compliance)
+    return [*_by_contact(mesh), mesh.structure, *coupled]
+
+
+def _by_slice(mesh: Mesh) -> list[Array | AbstractSpring]:
+    """Everything of helical gears whose last axes are those of slices and positions."""
+    if mesh.coupling is None:
+        return [*_by_contact(mesh), mesh.structure]
+    return [*_by_contact(mesh), mesh.coupling.scale]
+
+
+def _by_contact(mesh: Mesh) -> list[Array | AbstractSpring]:
     return [
         mesh.outer_steps,
         mesh.outer_gap,
         mesh.outer_lever,
         mesh.corner_gap,
         mesh.lever,
-        mesh.structure,
         mesh.law,
         mesh.width_factor,
         *(side.contact_roll_length for side in mesh.sides),
-        *coupled,
     ]

@@ -21,7 +21,8 @@ class Resolution(Checked):
 
     Attributes:
         positions: mesh positions over one base pitch.
-        slices: slices over the common face.
+        slices: slices over the common face; 1 takes it as a whole, of helical gears as many as show how their contact
+            lines run across it (`helical_slices`).
         pairs: tooth pairs carried along; None for as few as the gears and the load need, see `prepare`. Pair i runs at
             phase + (pairs - 1) // 2 - i base pitches, and mesh positions begin at phase 0, of an odd number of pairs at
             -1/2: they cover as much on either side of the pitch point, four pairs two base pitches, contact ratios up

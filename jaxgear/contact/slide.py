@@ -173,6 +173,10 @@ def _slide(sided_terms: Sequence[Sided], place: Place, nodes: tuple[Node, ...], 
     return amount, shift, seen.curvature / bulge
 
 
+# Slope per bulge below which a place is level [mm]: rounding decides its sign.
+_LEVEL = {jnp.dtype(jnp.float32): 1e-5, jnp.dtype(jnp.float64): 1e-9}
+
+
 class _Tried(NamedTuple):
     """A place where the contact was tried [mm], and the slope of the gap there [um/mm]."""
 
@@ -185,12 +189,14 @@ def _step(slope: Real, curvature: Real, moved: Real, tried: tuple[_Tried, ...], 
     """Where the parabola that leads to the least gap has it [mm], and its curvature [um/mm^2].
 
     Where a place that was tried before has a slope of the other sign, the least gap lies between: over a kink the
-    curvature is at least what the slopes of both tell, the latest of such places counting.
+    curvature is at least what the slopes of both tell, the latest of such places counting. Level places do not count:
+    the least gap is there.
     """
     total = seen = bulge + jnp.maximum(curvature, 0.0)
     for before in tried:
         apart = moved - before.moved
-        between = (slope * before.slope < 0) & (apart != 0)
+        level = jnp.abs(before.slope) < _LEVEL[slope.dtype] * bulge
+        between = (slope * before.slope < 0) & (apart != 0) & ~level
         across = (slope - before.slope) / jnp.where(between, apart, 1.0)
         total = jnp.where(between, jnp.maximum(seen, across), total)
     return moved - slope / total, total

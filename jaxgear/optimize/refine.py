@@ -8,6 +8,7 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 
 from ..contact import Mesh, prepare
+from ..contact.mesh import fewer_slices, slices_left
 from ..numerics import whole
 from .goal import FEASIBLE, counted
 from .linear_model import Linearizer, LinearModel, NoObjective
@@ -32,7 +33,8 @@ class Refined(NamedTuple):
 
     Attributes:
         record: of the finest mesh, with all that was spent; of the design on the steps.
-        change: of the objective at twice the positions; NaN where it was not evaluated.
+        change: of the objective at twice the positions and, of helical gears, with slices without end; NaN where it was
+            not evaluated.
         unrounded: of the finest mesh before the variables were rounded; the same as `record` without steps, and where
             no design on them keeps the limits that it keeps.
     """
@@ -68,8 +70,8 @@ def refined(
         _kept_to_limits(found, polish)
         record, ends = found, _on_steps(found, steps, polish)
         values, violations = at_more_positions(ends, ends.point[None])
+        change = problem.objectives[0].sign * (float(values[0, 0] - ends.value) + _left_by_slices(ends))
         found.evaluations = ends.evaluations
-        change = problem.objectives[0].sign * float(values[0, 0] - ends.value)
         now = np.asarray([[ends.value]]), np.asarray([ends.violation])
         return Refined(ends, change, found), fine_enough(*now, values, violations)
 
@@ -141,6 +143,19 @@ def at_more_positions(record: Record, points: np.ndarray) -> tuple[np.ndarray, n
     models = [[LinearModel(problem, point, of) for of in both] for point, both in zip(points, finer)]
     values = [[twice.value] if len(problem.objectives) == 1 else twice.values for twice, _ in models]
     return np.asarray(values), np.asarray([four.violation for _, four in models])
+
+
+def _left_by_slices(record: Record) -> float:
+    """Estimate of what slices without end add to the objective of the best design, zero of spur gears."""
+    fewer, linearizer = fewer_slices(record.problem.mesh), record.linearizer
+    if fewer is None:
+        return 0.0
+    posed, point = record.problem.on(fewer), record.point[None]
+    record.spend(1)
+    if linearizer is None:
+        return float(slices_left(record.value, np.asarray(scores(posed, point).value).item()))
+    (found,) = linearizer.on(posed)(point)
+    return float(slices_left(record.value, LinearModel(posed, record.point, found).value))
 
 
 def _kept_to_limits(record: Record, polish: Polish) -> None:

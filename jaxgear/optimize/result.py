@@ -105,8 +105,8 @@ class Optimum(eqx.Module):
         objective: least value found of what was minimized, in its unit.
         objective_unit: "" for a pure number.
         positions: of the mesh on which objective, cycle and constraints were evaluated, per base pitch.
-        grid_change: change of the objective when these are doubled, in its unit; NaN where it was not evaluated, as
-            with a search that stays on its mesh.
+        grid_change: change of the objective when these are doubled and, of helical gears, slices are without end, in
+            its unit; NaN where it was not evaluated, as with a search that stays on its mesh.
         optimality: first-order optimality: largest predicted decrease of the objective within bounds and constraints,
             per full range of a parameter; 0 at an optimum. It comes from the linearized problem (`linear_model`) and
             counts the kinks of extremes, where the plain gradient does not vanish. NaN where there are no parameters,

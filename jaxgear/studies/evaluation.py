@@ -8,7 +8,7 @@ import jax
 import numpy as np
 
 from ..contact import Mesh, MeshCycle, OperatingPoint, Resolution
-from ..contact.mesh import half_way
+from ..contact.mesh import fewer_slices, half_way, slices_left
 from ..contact.status import Status, reason
 from ..io import DesignFile, quantities_of_tables
 from ..metrics import (
@@ -45,7 +45,8 @@ class Evaluation:
         transmission_error: over the torques, shape (torques, positions) [um].
         ppte: peak-to-peak transmission error over the torques [um].
         objectives: what an optimization made small, by name and unit, of this design; empty without one.
-        grid_change: by how much numbers at the design torque change at twice the positions, by name and unit.
+        grid_change: change of numbers at the design torque at twice the positions and, of helical gears, with slices
+            without end, by name and unit.
         failed_torques: torques without a converged contact solution [N m], the design torque included.
         cause: why, in words: the most basic cause at all of them.
         seconds: what finding and evaluating it took, without compilation of the latter [s].
@@ -118,11 +119,27 @@ def evaluate(
 def grid_change(
     mesh: Mesh, cycle: MeshCycle, pinion: AbstractModification, wheel: AbstractModification
 ) -> dict[str, float]:
-    """By how much the extremes of a cycle change at twice the positions of its mesh, by name and unit."""
-    torque = np.asarray([float(cycle.torque)])
-    (between,) = over_torques(half_way(mesh), torque, pinion=pinion, wheel=wheel)
-    before, after = _extremes(cycle), _extremes(cycle, between)
-    return {name: after[name] - value for name, value in before.items()}
+    """Change of the extremes of a cycle at twice the positions of its mesh, by name and unit.
+
+    The error of the slices of helical gears is added, see `slices_left`.
+    """
+
+    def solved(mesh: Mesh) -> MeshCycle:
+        return over_torques(mesh, np.asarray([float(cycle.torque)]), pinion=pinion, wheel=wheel)[0]
+
+    before, after = _extremes(cycle), _extremes(cycle, solved(half_way(mesh)))
+    change = {name: after[name] - value for name, value in before.items()}
+    fewer = fewer_slices(mesh)
+    if fewer is not None:
+        of_fewer = _extremes(solved(fewer))
+        change = {name: by + slices_left(before[name], of_fewer[name]) for name, by in change.items()}
+    return change
+
+
+def grid_of(sizes: Resolution, *, helical: bool) -> str:
+    """Positions and, of helical gears, slices in words."""
+    slices = f" and {sizes.slices} slices, whose error is estimated from a third of them" if helical else ""
+    return f"{sizes.positions} positions{slices}"
 
 
 def _extremes(*cycles: MeshCycle) -> dict[str, float]:

@@ -18,7 +18,7 @@ from ..numerics import program
 from ..optimize import Verified
 from ..report import Table
 from ..vocabulary import quantities
-from .evaluation import Evaluation, grid_lines
+from .evaluation import Evaluation, grid_lines, grid_of
 
 Evaluations = Mapping[str, Evaluation]
 
@@ -108,9 +108,9 @@ def finding_lines(found: Mapping[str, tuple[Finding, ...]]) -> Iterator[str]:
 
 def grid(evaluations: Evaluations, more: str = "") -> Iterator[str]:
     """How fine the mesh was, and what a finer one would change, besides `more`."""
-    positions = next(iter(evaluations.values())).cycle.kinematics.resolution.positions
+    moving = next(iter(evaluations.values())).cycle.kinematics
     changes = {name: evaluation.grid_change for name, evaluation in evaluations.items()}
-    return grid_lines(f"{positions} positions", changes, more)
+    return grid_lines(grid_of(moving.resolution, helical=moving.helical), changes, more)
 
 
 @program
