@@ -1,6 +1,5 @@
 """Helical gears: geometry, the contact slice by slice and its limits, and what does not know them yet."""
 
-import re
 from dataclasses import replace
 
 import equinox as eqx
