@@ -20,6 +20,7 @@ import jaxgear as jg  # noqa: E402
 
 TORQUE, ANGLE, MODULE, WIDTH = 150.0, 15.0, 3.0, 20.0  # N m, deg, mm, mm
 BORES = 20.0, 100.0  # mm
+SLICES = 33  # thirty for every base pitch of overlap, which is nearly one at 25 degrees
 LIGHT = 8.0, 0.4  # a relief for lower loads: um, share of the longest one
 MOST, LONGEST = 40.0, 6.0  # um, mm of roll length
 
@@ -37,7 +38,7 @@ def gear_pair(angle=None):
     )
 
 
-def sizes(fast, slices=11):
+def sizes(fast, slices):
     """Array sizes; four pairs hold the contact lines of 25 degrees."""
     return jg.Resolution(positions=16 if fast else 64, slices=slices, pairs=4)
 
@@ -77,7 +78,7 @@ def study(fast=False):
     grid = jnp.stack(jnp.meshgrid(amounts, lengths, indexing="ij"), axis=-1)
     light = jnp.asarray([LIGHT[0], LIGHT[1] * LONGEST])
     found = {"amounts": amounts, "lengths": lengths, "light": light, "meshes": {}, "ppte": {}, "light_ppte": {}}
-    for name, angle, slices in (("spur", None, 1), ("helical", ANGLE, 11)):
+    for name, angle, slices in (("spur", None, 1), ("helical", ANGLE, 11 if fast else SLICES)):
         mesh = jg.prepare(gear_pair(angle), resolution=sizes(fast, slices))
         values = mapped(mesh, jnp.concatenate([grid.reshape(-1, 2), light[None]]))
         found["meshes"][name], found["ppte"][name] = mesh, values[:-1].reshape(grid.shape[:2])
@@ -86,7 +87,7 @@ def study(fast=False):
     best = _best(found, "helical")
     designs = jnp.stack([jnp.asarray([0.0, 1.0]), light, best])
     found["angles"], found["designs"] = angles, designs
-    found["over_angles"], found["overlap"] = over_angles(angles, designs, sizes(fast))
+    found["over_angles"], found["overlap"] = over_angles(angles, designs, sizes(fast, 11 if fast else SLICES))
     return found
 
 

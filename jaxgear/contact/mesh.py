@@ -402,7 +402,7 @@ def fewer_slices(mesh: Mesh) -> Mesh | None:
     return eqx.tree_at(_by_slice, mesh, jax.tree.map(lambda leaf: leaf[..., middles, :], _by_slice(mesh)))
 
 
-def slices_left(value: Given, of_fewer: Given) -> Given:
+def slices_left(value: Any, of_fewer: Any) -> Any:
     """Estimate of what slices without end would add to a value, from that of `fewer_slices`."""
     return _LEFT * (value - of_fewer)
 
@@ -453,9 +453,9 @@ def _by_position(mesh: Mesh) -> list[Array | AbstractSpring]:
 
 def _by_slice(mesh: Mesh) -> list[Array | AbstractSpring]:
     """Everything of helical gears whose last axes are those of slices and positions."""
-    if mesh.coupling is None:
-        return [*_by_contact(mesh), mesh.structure]
-    return [*_by_contact(mesh), mesh.coupling.scale]
+    scale = mesh.structure if mesh.coupling is None else mesh.coupling.scale
+    assert scale is not None  # slices of helical gears have one
+    return [*_by_contact(mesh), scale]
 
 
 def _by_contact(mesh: Mesh) -> list[Array | AbstractSpring]:
