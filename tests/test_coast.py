@@ -74,7 +74,7 @@ def test_what_knows_drive_flanks_alone_says_so(load, tmp_path):
     with pytest.raises(DesignFileError) as refused:
         Other.of(design).run()
     assert known.format("jaxgear other") in str(refused.value) and DesignAnalysis.takes_coast
-    options = {"stage": None, "flank": None, "load_case": None, "torque": None}
+    options = {"stage": None, "flank": None, "load_case": None, "torque": None, "given": ()}
     with pytest.raises(DesignFileError, match="coast flanks, which jaxgear convert does not know"):
         convert(tmp_path / "pair.toml", tmp_path / "pair.rexs", **options)
     with pytest.raises(DesignFileError, match="load.torque: 0 N m must be greater than 0 N m"):

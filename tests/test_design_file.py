@@ -323,7 +323,7 @@ MALFORMED = {
     ),
     "physical error of a material": (
         text(pinion="material = { poisson_ratio = 0.7 }"),
-        "pinion.material.poisson_ratio: 0.7 must be at least 0 and less than 0.5",
+        "pinion.material.poisson_ratio: 0.7 must be at least 0 and at most 0.5",
     ),
     "physical error of the pair": (
         text().replace("module = 3\n", "module = 4.0\n"),

@@ -46,7 +46,7 @@ def test_slices_show_the_contact_lines(load):
     assert design.resolution().slices == 22 == helical_slices(design.pair())
     wide = "[resolution]\nslices = 7"
     assert load(pinion=ANGLE, tail=wide).resolution().slices == 7
-    for low, high, slices in ((-5.0, 5.0, 11), (-40.0, 20.0, 44), (0.0, 45.0, 55)):
+    for low, high, slices in ((-5.0, 5.0, 11), (-40.0, 20.0, 44), (0.0, 45.0, 44)):
         free = load(wheel=OPEN, tail=VARIABLE.format(low=low, high=high)).resolution()
         assert (free.slices, free.pairs >= 4) == (slices, True)
     assert load().resolution().slices == 1

@@ -57,7 +57,9 @@ def test_an_even_load_wears_all_slices_by_the_formula(mesh, place):
     inner[:, [0, 1, -1]] = False  # ends of the flank, where the contact is as wide as the grid
     error = np.abs(depth - exact[:, None]) / exact.max()
     assert error[np.broadcast_to(inner[:, None], error.shape)].max() < 0.012
-    assert np.abs(depth - depth[:, :1]).max() < 0.02 * depth.max()
+    between = np.abs(depth - depth[:, :1]) / depth.max()
+    assert between[np.broadcast_to(inner[:, None], between.shape)].max() < 0.002
+    assert between.max() < 0.03  # at an end of the flank, where the last position of every slice is cut off elsewhere
 
 
 @cache

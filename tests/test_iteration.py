@@ -138,7 +138,7 @@ def test_a_relief_that_rises_to_the_tip_is_as_level_and_keeps_the_tip_edges_out(
     as it comes to the deflection of a single pair: twice the height of the plateau."""
     plateau, _ = nominal
     pressure = jg.quantities["max_contact_pressure"]
-    assert float(pressure(plateau.cycle)) > 4000.0
+    assert float(pressure(plateau.cycle)) > 3500.0
     assert float(pressure(slanted.cycle)) <= 2000.0 and slanted.feasible
     assert slanted.ppte <= plateau.ppte
     for state in slanted.iterations[1:]:

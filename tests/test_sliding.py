@@ -310,5 +310,5 @@ def test_rounding_does_not_decide_where_a_contact_rests(mesh):
     """Torques that differ in their last digits alone: a place that was tried before is level up to rounding."""
     steep = jg.TipRelief(40.0, 2.5, jg.Linear())
     found = jax.vmap(lambda torque: removed_material(mesh, torque, pinion=steep).amount)
-    amounts = np.asarray(found(200 * (1 + 1e-13 * jnp.arange(40))))
+    amounts = np.asarray(found(200 * (1 + 1e-13 * jnp.arange(40.0))))
     assert np.ptp(amounts, axis=0).max() < 1e-10  # um

@@ -57,7 +57,7 @@ def test_a_word_of_the_trade_says_what_to_do(table, word, said):
     assert said in unknown_key(word, TABLES[table])
 
 
-@pytest.mark.parametrize("word", ["base_helix", "pitch_diam", "roots_diameter", "reference_diameters", "tip_width"])
+@pytest.mark.parametrize("word", ["base_helix", "pitch_diam", "reference_diameters", "tip_width"])
 def test_likeness_of_letters_alone_suggests_nothing(word):
     """Half of the letters of a key of another quantity: the keys are listed instead."""
     assert unknown_key(word, TABLES["pinion"]).startswith("unknown key, must be one of addendum, ")

@@ -1,7 +1,7 @@
 """A prepared mesh: everything that depends neither on the modification nor on the torque."""
 
 from dataclasses import replace
-from typing import Any, TypedDict, Unpack
+from typing import Any, TypedDict, TypeVar, Unpack
 
 import equinox as eqx
 import jax
@@ -389,6 +389,9 @@ _GROUP = 3  # slices, that of the middle one of which can stand for all of them
 _LEFT = 0.25
 
 
+Value = TypeVar("Value", float, np.ndarray)
+
+
 def fewer_slices(mesh: Mesh) -> Mesh | None:
     """The mesh of helical gears with every three slices at the phase of their middle, in arrays of the same shapes.
 
@@ -402,7 +405,7 @@ def fewer_slices(mesh: Mesh) -> Mesh | None:
     return eqx.tree_at(_by_slice, mesh, jax.tree.map(lambda leaf: leaf[..., middles, :], _by_slice(mesh)))
 
 
-def slices_left(value: Any, of_fewer: Any) -> Any:
+def slices_left(value: Value, of_fewer: Value) -> Value:
     """Estimate of what slices without end would add to a value, from that of `fewer_slices`."""
     return _LEFT * (value - of_fewer)
 

@@ -194,6 +194,8 @@ def check(
     known = None if value is None else concrete(value)
     if known is None:
         return
+    if known.dtype.kind not in "biuf":
+        raise ValueError(f"{owner}: {no_number(name, value)}")
     bad = ~np.isfinite(known)
     if low is not None:
         bad |= (known <= low) if open_low else (known < low)
