@@ -19,11 +19,11 @@ _PAIRS_TRACED = 4
 _FEWEST_PAIRS = 2
 # Pairs beyond those on the path of contact that a deflection may need: teeth that bend farther have broken.
 _MORE_PAIRS = 10
-# Slices of helical gears for every base pitch that the face overlaps. Load sets in steeply where a tip corner enters: with
-# 11 for one base pitch PPTE is 24 % off, with these 2 % (23/67 teeth, module 2.25 mm, 18 degrees).
+# Slices of helical gears for every base pitch that the face overlaps. Load sets in steeply where a tip corner enters:
+# with 11 for one base pitch PPTE is 24 % off, with these 2 % (23/67 teeth, module 2.25 mm, 18 degrees).
 _PER_PITCH = 30
-# They come in the number that one turn of the loops over slices takes (`numerics.coupling`). Faces that overlap more than
-# three base pitches have no more: there the many contact lines even PPTE out.
+# They come in the number that one turn of the loops over slices takes (`numerics.coupling`). Faces that overlap more
+# than three base pitches have no more: there the many contact lines even PPTE out.
 _STEP, _MOST_SLICES = 11, 99
 
 
