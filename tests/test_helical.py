@@ -306,13 +306,15 @@ def test_slices_of_one_phase_stand_for_fewer():
 @pytest.mark.slow
 def test_the_error_of_the_slices_is_estimated():
     """Without coupling, slices of one phase are those of a third as many; the estimate is about the true error."""
-    ripple = {}
+    ripple, curves = {}, {}
     for slices in (11, 33, 99):
         sizes = replace(SIZES, slices=slices, coupled_slices=False)
         mesh = jg.prepare(pair_of(), resolution=sizes)
         every = jg.solve(mesh, TORQUE), jg.solve(fewer_slices(mesh), TORQUE)
-        ripple[slices] = [float(np.ptp(cycle.transmission_error)) for cycle in every]
+        curves[slices] = [np.asarray(cycle.transmission_error) for cycle in every]
+        ripple[slices] = [float(np.ptp(curve)) for curve in curves[slices]]
     for few, many in ((11, 33), (33, 99)):
         assert ripple[many][1] == pytest.approx(ripple[few][0], rel=1e-9)
-    error, estimate = ripple[99][0] - ripple[33][0], slices_left(*ripple[33])
-    assert 0.5 * abs(error) < abs(estimate) < 20 * abs(error)
+    # of the curve: extremes of two curves may agree by chance
+    error, estimate = np.ptp(curves[99][0] - curves[33][0]), np.ptp(slices_left(*curves[33]))
+    assert 0.5 * error < estimate < 20 * error

@@ -188,7 +188,9 @@ def test_a_search_by_gradients_is_held_by_the_margins():
         margins = jg.margins(pair(x))
         rows = [getattr(margins, name) for name in NAMES]
         # a tip as thick as engineers ask for, and backlash in a unit near 1
-        return jnp.stack(rows).at[0].add(-0.6).at[1].add(-0.6) * jnp.asarray([1.0] * 11 + [0.01, 1.0, 1.0])
+        return jnp.stack(rows).at[0].add(-0.6).at[1].add(-0.6) * jnp.where(
+            jnp.asarray([name == "backlash" for name in NAMES]), 0.01, 1.0
+        )
 
     def all_of(x):
         """What is to be least, and the rules; whether all of them are kept."""

