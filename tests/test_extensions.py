@@ -281,6 +281,7 @@ def test_a_method_of_a_user_is_given_as_an_object_or_known_by_name(load, monkeyp
     assert np.abs(height - given.parameters["height"]).min() < 1e-9 and given.method == "scatter"
     monkeypatch.setitem(jg.optimize.METHODS, "scatter", Scatter)
     asked = BY_FACTORIAL.replace("factorial", "scatter") + "seed = 3\nscatter = { designs = 5 }\n"
+    asked += "rounding = { length = 0, amount = 0 }\n"
     named = optimize_request(load(asked), quick=True)(mesh)
     assert named.parameters == given.parameters and named.objective == given.objective
     for wrong, problem in (

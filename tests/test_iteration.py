@@ -156,7 +156,7 @@ def test_a_relief_that_rises_to_the_tip_is_as_level_and_keeps_the_tip_edges_out(
 @pytest.mark.slow
 def test_the_limit_of_the_pressure_is_kept_between_the_positions(mesh):
     """At four times the positions that judge it; what the positions of the mesh alone judge passes it."""
-    limit, count = 3000.0, mesh.resolution.positions
+    limit, count = 2430.0, mesh.resolution.positions
     fine = parts(jg.prepare(mesh.pair, resolution=replace(mesh.resolution, positions=4 * POSITIONS)), count)
     judged, short = (
         jg.optimize.iterate_transmission_error(mesh, TORQUE, max_relief=12.0, max_pressure=limit, positions=positions)

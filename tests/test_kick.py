@@ -69,14 +69,14 @@ PAIR_50_50 = gear_pair((50, 50), **STRAIGHT, tooth_thickness_allowance=-72.0)
 PAIR_23_37 = gear_pair((23, 37), 2.5, face_width=20.0, bores=(25.0, 25.0), tooth_thickness_allowance=-50.0)
 
 
-def on_map(pair, relief, torque, speeds, damping_ratio, **inertias):
-    """With the usual kicks, with a single one of 3.1, and the natural frequency."""
+def on_map(pair, relief, torque, speeds, damping_ratio, missed_by=3.1, **inertias):
+    """With the usual kicks, which find what a single one misses, and the natural frequency."""
     mesh = jg.prepare(
         pair, compliance=jg.default_compliance(plane="stress"), resolution=jg.Resolution(positions=64, pairs=2)
     )
     settings = Dynamics(speeds, damping_ratio=damping_ratio, **inertias)
     moving = settings.oscillator(mesh, torque, pinion=relief, wheel=relief)
-    one_size = speed_sweep(moving, speeds, direction="down", kick=3.1, steps=256)
+    one_size = speed_sweep(moving, speeds, direction="down", kick=missed_by, steps=256)
     assert (np.asarray(one_size.period) == 1).all()
     return settings.run(moving, KICKED, steps=256), float(natural_frequencies(moving).mesh)
 
@@ -84,17 +84,17 @@ def on_map(pair, relief, torque, speeds, damping_ratio, **inertias):
 @pytest.mark.slow
 def test_two_cycles_that_one_size_of_kick_misses():
     """On maps of relieved and unmodified gears."""
-    # the orbit of two cycles ends at 1.76 times the natural frequency
+    # the orbit of two cycles ends at 1.7 times the natural frequency
     relief = jg.TipRelief(6.0, 3.27, jg.Parabolic())
-    found, _ = on_map(PAIR_50_50, relief, 200.0, [5600.0, 5700.0, 5900.0], 0.0425, **DISCS)
+    found, _ = on_map(PAIR_50_50, relief, 200.0, [5300.0, 5606.0, 5803.0], 0.0425, **DISCS)
     assert [int(period) for period in found.period] == [1, 2, 2]
-    assert float(found.dynamic_factor[1]) == pytest.approx(2.94, abs=0.01)
-    # at 1.36 to 1.43 times of it
+    assert float(found.dynamic_factor[1]) == pytest.approx(3.0, abs=0.01)
+    # at 1.35 to 1.44 times of it
     none = jg.TipRelief(0.0, 3.27, jg.Parabolic())
-    found, natural = on_map(PAIR_50_50, none, 200.0, [4450.0, 4560.0, 4675.0], 0.0425, **DISCS)
-    assert natural == pytest.approx(3270.0, rel=0.002)
+    found, natural = on_map(PAIR_50_50, none, 200.0, [4377.0, 4485.0, 4675.0], 0.0425, missed_by=2.6, **DISCS)
+    assert natural == pytest.approx(3250.0, rel=0.002)
     assert (np.asarray(found.period) == 2).all() and float(found.dynamic_factor.min()) > 4.2
     relief = jg.TipRelief(7.5, 3.5, jg.Parabolic())
-    found, natural = on_map(PAIR_23_37, relief, 50.0, [12_000.0, 12_250.0, 12_500.0], 0.04)
+    found, natural = on_map(PAIR_23_37, relief, 50.0, [11_800.0, 12_000.0, 12_250.0], 0.04)
     assert (np.asarray(found.period) == 2).all()
     np.testing.assert_allclose(found.dynamic_factor, 2.7, atol=0.15)

@@ -195,7 +195,7 @@ def test_analysis_and_sweep_give_what_the_library_gives(load, file, tmp_path, ca
     modified, expected = summary["designs"]["modified"], solved(6.0)
     assert [modified[quantity.key] for quantity in numbers] == pytest.approx([float(number) for number in expected])
     assert summary["lubricant"]["viscosity_40_mm2_per_s"] == 100.0 and summary["lubricant"]["friction"] == "schlenk"
-    assert summary["strength"] == {"pitting_MPa": 1500.0, "bending_MPa": 900.0}
+    assert summary["strength"] == {"pitting_MPa": 1500.0, "bending_MPa": 900.0, "load_factor": 1.0}
     shown = capsys.readouterr().out
     for label in ("scuffing safety S_B", "pinion root safety S_F", "power loss of the flanks [W]"):
         assert label in shown

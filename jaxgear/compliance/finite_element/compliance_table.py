@@ -152,7 +152,9 @@ class Scale(eqx.Module):
 
 def different(table: GearTable, shape: Shape) -> str | None:
     """The first number of a gear that is not that of its table, in words; both are concrete."""
-    for name, there, here in zip(Shape._fields, np.asarray(table.shape, float), shape):
+    numbers = [*zip(Shape._fields, np.asarray(table.shape, float), shape)]
+    # a bore that is not given follows from the others: last, as it is not the reason
+    for name, there, here in sorted(numbers, key=lambda number: number[0] == "bore_ratio"):
         if abs(here - there) > _ALIKE * max(abs(there), 1.0):
             return f"{_WORDS.get(name, name)} = {here:.7g} differs from {there:.7g} of its table"
     return None
