@@ -131,14 +131,23 @@ def test_transverse_load_factors_of_the_worked_example():
         for of in (5, 10, 11)
     )
     assert float(printed.contact) == float(printed.root) == 1.0
-    base = 0.925 * float(ToleranceClass.of(example().wheel, 10).single_pitch) * np.cos(np.deg2rad(20.71975))
-    moved = 17.46485 * base / (1273.524 * 1.003 * 1.16)
+    limits = ToleranceClass.of(example().wheel, 10)
+    base = float(limits.single_pitch) * np.cos(np.deg2rad(20.71975))
+    moved = 17.46485 * (float(limits.profile_form) - 0.075 * base) / (1273.524 * 1.003 * 1.16)
     by_hand = 0.9 + 0.4 * np.sqrt(2 * 1.632459 / 2.632459) * moved
     assert float(rough.contact) == float(rough.root) == pytest.approx(by_hand, rel=1e-4) and by_hand > 1.05
     light = transverse_load_factors(example(), 500.0, quality_class=11)
     assert float(worst.contact) > float(rough.contact)
     assert float(light.contact) == pytest.approx(2.632459, rel=1e-5)  # Z_eps^2 = 1 / eps_alpha
     assert float(light.root) == pytest.approx(2.632459 / (0.25 * 1.549090 + 0.75), rel=1e-5)
+    given = transverse_load_factors(
+        example(), 9000.0, deviations=(base, 0.5 * base), dynamic_factor=1.003, face_load_factor=1.16
+    )
+    assert float(given.contact) == pytest.approx(
+        0.9 + 0.4 * np.sqrt(2 * 1.632459 / 2.632459) * 17.46485 * 0.925 * base / (1273.524 * 1.003 * 1.16), rel=1e-4
+    )
+    with pytest.raises(ValueError, match="deviations have no effect beside quality_class = 5, give either"):
+        transverse_load_factors(example(), 9000.0, quality_class=5, deviations=(10.0, 12.0))
 
 
 def test_transverse_load_factors_of_spur_gears_and_across_a_total_contact_ratio_of_two():

@@ -147,6 +147,8 @@ def test_friction_by_hand(cycle, law, factor):
     rolling = 2 * (SPEED * np.pi / 30) * 36.6e-3 * np.sin(working)  # 2 v_t sin(alpha_wt)
     radius = base_radius * np.tan(working) * 0.6  # u / (u + 1)
     load = 1e3 * TORQUE / base_radius / 14.0
+    if law == "iso_6336_20":
+        load *= np.cos(np.deg2rad(20.0))  # F_t / b
     eta = 1e3 * float(OIL.viscosity(80.0))
     surface = 2.2 * (0.4 / radius) ** 0.25 if law == "iso_6336_22" else 0.4**0.25
     expected = factor * (load / (rolling * radius)) ** 0.2 * eta**-0.05 * surface

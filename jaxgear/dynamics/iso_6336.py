@@ -73,6 +73,7 @@ def iso_dynamic_factor(
     speed: Given,
     *,
     quality_class: Given | None = None,
+    deviations: tuple[Given, Given] | None = None,
     tip_relief: Given = 0.0,
     application_factor: Given = 1.0,
     reduced_mass: Given | None = None,
@@ -89,6 +90,8 @@ def iso_dynamic_factor(
         speed: of the pinion [rpm].
         quality_class: flank tolerance class of both gears (ISO 1328-1:2013), of which the larger base pitch and form
             deviation count; None for gears without deviation.
+        deviations: f_pb and f_falpha [um], the larger of both gears, in place of a class: measured, or of an earlier
+            edition of the standard.
         tip_relief: C_a [um]; for flanks without any the standard takes what running in wears off,
             `sizing.run_in_relief`.
         application_factor: K_A.
@@ -104,8 +107,6 @@ def iso_dynamic_factor(
     check(owner, "application_factor", application_factor, "", low=0.0, open_low=True)
     check(owner, "reduced_mass", reduced_mass, "kg/mm", low=0.0, open_low=True)
     check(owner, "run_in", run_in, "", low=0.0, high=1.0)
-    none = real(0.0)
-    deviations = (none, none) if quality_class is None else _deviations(pair, quality_class)
     return _factor(
         pair,
         real(torque),
@@ -113,7 +114,7 @@ def iso_dynamic_factor(
         real(tip_relief),
         real(application_factor),
         real(run_in),
-        *deviations,
+        *_deviations(owner, pair, quality_class, deviations),
         optional_real(reduced_mass),
     )
 
@@ -134,7 +135,8 @@ def transverse_load_factors(
     pair: GearPair,
     torque: Given,
     *,
-    quality_class: Given,
+    quality_class: Given | None = None,
+    deviations: tuple[Given, Given] | None = None,
     dynamic_factor: Given = 1.0,
     face_load_factor: Given = 1.0,
     application_factor: Given = 1.0,
@@ -142,15 +144,16 @@ def transverse_load_factors(
 ) -> TransverseLoadFactors:
     """K_Halpha and K_Falpha of a gear pair.
 
-    0.9 + 0.4 c_gamma_alpha (f_pb - y_alpha) / (F_tH / b), F_tH = F_t K_A K_v K_Hbeta; of total contact ratios
-    eps_gamma up to 2 times eps_gamma / 2, above it with a second term times sqrt(2 (eps_gamma - 1) / eps_gamma). At
-    least 1; at most eps_gamma / (eps_alpha Z_eps^2) and eps_gamma / (0.25 eps_alpha + 0.75), one pair that carries all.
-    Equations (73) to (76) of the edition of 2006, from the source of `IsoDynamicFactor`.
+    0.9 + 0.4 c_gamma_alpha (f - y_alpha) / (F_tH / b), F_tH = F_t K_A K_v K_Hbeta, with the larger f of f_pb and
+    f_falpha and the running-in y_alpha of f_pb; of total contact ratios eps_gamma up to 2 times eps_gamma / 2, above it
+    with a second term times sqrt(2 (eps_gamma - 1) / eps_gamma). At least 1; at most eps_gamma / (eps_alpha Z_eps^2)
+    and eps_gamma / (0.25 eps_alpha + 0.75), one pair that carries all. Equations (73) to (76) of the edition of 2006,
+    from the source of `IsoDynamicFactor`; f as the report of a commercial program has it (1.069).
 
     Args:
         pair: gear pair.
         torque: on the pinion, more than 0 [N m].
-        quality_class, application_factor, run_in: as of `iso_dynamic_factor`.
+        quality_class, deviations, application_factor, run_in: as of `iso_dynamic_factor`.
         dynamic_factor: K_v.
         face_load_factor: K_Hbeta.
     """
@@ -161,7 +164,8 @@ def transverse_load_factors(
     check(owner, "application_factor", application_factor, "", low=0.0, open_low=True)
     check(owner, "run_in", run_in, "", low=0.0, high=1.0)
     load = _line_load(pair, real(torque), real(application_factor))
-    deviation = _deviations(pair, quality_class)[0] * (1 - real(run_in))
+    pitch, form = _deviations(owner, pair, quality_class, deviations)
+    deviation = jnp.maximum(pitch, form) - pitch * real(run_in)
     moved = iso_stiffness(pair, load).mesh * deviation / (load * real(dynamic_factor) * real(face_load_factor))
     along, total = path_of_contact(pair).contact_ratio, _total_contact_ratio(pair)
     above = jnp.maximum(total, 2.0)
@@ -223,8 +227,16 @@ def factor_of(
     return jnp.where(resonance_ratio <= main_begins, low, upper)
 
 
-def _deviations(pair: GearPair, quality_class) -> tuple[Scalar, Scalar]:
-    """f_pb and f_falpha [um], the larger of both gears'."""
+def _deviations(owner: str, pair: GearPair, quality_class, given) -> tuple[Scalar, Scalar]:
+    """f_pb and f_falpha [um], the larger of both gears': given, of a class, or zero."""
+    if given is not None:
+        if quality_class is not None:
+            raise ValueError(f"{owner}: deviations have no effect beside quality_class = {quality_class}, give either")
+        for value in given:
+            check(owner, "deviations", value, "um", low=0.0)
+        return real(given[0]), real(given[1])
+    if quality_class is None:
+        return real(0.0), real(0.0)
     gears = [(gear, ToleranceClass.of(gear, quality_class)) for gear in (pair.pinion, pair.wheel)]
     base = [limits.single_pitch * jnp.cos(gear.transverse_pressure_angle) for gear, limits in gears]
     return jnp.maximum(*base), jnp.maximum(*(limits.profile_form for _, limits in gears))

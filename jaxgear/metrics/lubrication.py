@@ -134,9 +134,10 @@ def friction_coefficient(cycle: MeshCycle, lubricant: Lubricant) -> Scalar:
     factors K of the lubricant and `helical_load_factor` K_Bgamma,
 
         "schlenk"      c = 0.048, X_R = Ra^0.25,               w = F_bt / b
-        "iso_6336_20"  c = 0.060, X_R = Ra^0.25,               w = K F_bt / b
+        "iso_6336_20"  c = 0.060, X_R = Ra^0.25,               w = K F_t / b
         "iso_6336_22"  c = 0.045, X_R = 2.2 (Ra / rho)^0.25,   w = K K_Bgamma F_bt / b
 
+    F_bt is the force on the transverse line of action, F_t = F_bt cos(alpha_t) that on the reference circle.
     A coefficient that the cycle was solved with (`OperatingPoint.friction`) counts in its place.
 
     Raises:
@@ -160,7 +161,8 @@ def friction_coefficient(cycle: MeshCycle, lubricant: Lubricant) -> Scalar:
             line_load = line_load * lubricant.load_factor * helical_load_factor(cycle.kinematics.pair)
             surface = _ISO_22 * _ISO_22_ROUGHNESS * (lubricant.roughness / radius) ** 0.25
         case "iso_6336_20":
-            line_load = line_load * lubricant.load_factor
+            tangential = line_load * jnp.cos(cycle.kinematics.pair.pinion.transverse_pressure_angle)
+            line_load = tangential * lubricant.load_factor
             surface = _ISO_20 * lubricant.roughness**0.25
         case _:
             surface = _SCHLENK * lubricant.roughness**0.25
