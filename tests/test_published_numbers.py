@@ -7,6 +7,7 @@ or half a unit of the last printed digit; a row with a note says why it does not
 
 import csv
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -15,9 +16,13 @@ import jax.numpy as jnp
 import pytest
 
 import jaxgear as jg
-from jaxgear.geometry import diameter, outline, path_of_contact
+from jaxgear import metrics
+from jaxgear.contact.kinematics import kinematics
+from jaxgear.dynamics import equivalent_mass
+from jaxgear.dynamics.iso_6336 import iso_dynamic_factor, transverse_load_factors
+from jaxgear.geometry import diameter, margins, outline, path_of_contact
 from jaxgear.geometry.margins import play_between
-from jaxgear.manufacture import drawn_gear, measures
+from jaxgear.manufacture import drawn_gear, measures, teeth_spanned
 from jaxgear.metrics.stress import (
     contact_factor_squares,
     critical_section,
@@ -25,6 +30,8 @@ from jaxgear.metrics.stress import (
     single_contact_factors,
 )
 from jaxgear.numerics import changed, real
+from jaxgear.shafts import method_c
+from jaxgear.tolerance import ToleranceClass, iso_rounded
 
 FILE = Path(__file__).with_name("published.csv")
 ROWS = list(csv.DictReader(line for line in FILE.read_text().splitlines() if not line.startswith("#")))
@@ -61,6 +68,7 @@ def published(
     modulus=206_000.0,
     form=None,
     blank=(1.0, 1.0),
+    bores=None,
     **more,
 ):
     """A function that makes the pair with tooth thickness allowances [um], or with spans over the numbers of teeth.
@@ -78,7 +86,8 @@ def published(
             gear = drawn_gear(
                 teeth=teeth[side], module=module, profile_shift=shift[side], face_width=width, helix_angle=hand,
                 tip_diameter=tips[side], tip_form_diameter=(form or tips)[side], dedendum=rack[0], root_radius=rack[1],
-                material=jg.Material(modulus), bore_diameter=0.4 * tips[side], tip_edge_radius=0.02 * module,
+                material=jg.Material(modulus), bore_diameter=(bores or (0.4 * tips[0], 0.4 * tips[1]))[side],
+                tip_edge_radius=0.02 * module,
                 rim_thickness=blank[0] * module, web_thickness=blank[1] * width, **thickness,
             )  # fmt: skip
             gears.append(changed(gear, helix_angle=real(hand)))
@@ -98,7 +107,7 @@ EXAMPLE_1 = published(
 )  # fmt: skip
 FZG_C = published(
     (16, 24), 4.5, (0.1818, 0.1714), 91.5, 14.0, (82.45, 118.35), (1.39, 0.25), modulus=210_000.0, spanned=(3.0, 4.0),
-    balls=(8.0, 7.5), force=130e3 / 36.0,
+    balls=(8.0, 7.5), force=130e3 / 36.0, bores=(30.0, 30.0),
 )  # fmt: skip
 HELIX_20 = published(
     (25, 65), 5.0, (0.25, 0.0686), 241.0, 50.0, (145.522, 356.544), (1.25, 0.30), beta=20.0, spanned=(5.0, 10.0),
@@ -177,6 +186,11 @@ def active_root(of: Known):
     return diameter(of.both, jnp.stack([path.pinion_roll_length(path.start), path.wheel_roll_length(path.end)]))
 
 
+def active_tip(of: Known):
+    path = of.path
+    return diameter(of.both, jnp.stack([path.pinion_roll_length(path.end), path.wheel_roll_length(path.start)]))
+
+
 def play(of: Known):
     return play_between(*of.pair.gears, jnp.tan(of.pair.working_pressure_angle))
 
@@ -211,6 +225,7 @@ QUANTITIES: dict[str, Callable[[Known], Any]] = {
     "da": lambda of: 2 * of.both.tip_radius,
     "df": lambda of: 2 * of.both.root_circle_radius,
     "dFf": lambda of: diameter(of.both, jax.vmap(outline)(of.both).form_roll_length),
+    "dNa": active_tip,
     "dNf": active_root,
     "dw": lambda of: 2 * of.both.base_radius / jnp.cos(of.pair.working_pressure_angle),
     "zn": lambda of: of.both.virtual_teeth,
@@ -242,6 +257,7 @@ QUANTITIES: dict[str, Callable[[Known], Any]] = {
     "c'": lambda of: of.stiffness.single,
     "c_ga": lambda of: of.stiffness.mesh,
 }
+SPANNED = {row["set"] for row in ROWS if row["quantity"] in ("k1", "f_pT1")}
 DIFFERENCES = {"A_We": "Wk", "A_Mde": "MdK"}  # by which an allowance changes another quantity
 
 
@@ -256,6 +272,115 @@ def values_of(name: str) -> dict[str, Any]:
     return everything(jax.tree.map(jnp.asarray, SETS[name]()))
 
 
+class Rated(NamedTuple):
+    """How a pair was run, and what its report takes further factors from.
+
+    Attributes:
+        torque, speed: of the pinion [N m, rpm].
+        application, dynamic, face, transverse: K_A, K_v, K_Hbeta and K_Halpha as printed.
+        deviations: f_pb and f_falpha as printed [um].
+        relief: C_a by running in [um].
+        mass: m_red by the moments of inertia [kg/mm], zero for rings.
+        oil: with the oil's and the flanks' numbers.
+        bulk: temperature of the teeth as printed [degC].
+    """
+
+    torque: float
+    speed: float
+    application: float
+    dynamic: float
+    face: float
+    transverse: float
+    deviations: tuple[float, float]
+    relief: float
+    mass: float
+    oil: metrics.Lubricant
+    bulk: float
+
+
+RATED: dict[str, Rated] = {
+    "KS-stage3": Rated(
+        40953.0, 1165.9, 1.25, 1.092, 1.15, 1.069, (15.9, 22.0), 2.0,
+        float(equivalent_mass(jg.GearPair(*STAGE_3().gears, 861.0), (3.87681, 399.02862))) / 360.0,
+        metrics.Lubricant(220.0, 19.0, 80.0, 0.6, density=890.0, bulk="loss", permissible_film=0.143), 85.0,
+    ),
+    "ST-fzgC upper": Rated(
+        130.0, 1500.0, 1.0, 1.03, 1.32, 1.0, (7.0, 8.0), 2.0, 0.0,
+        metrics.Lubricant(90.02, 10.41, 60.0, 0.3, density=884.1, bulk="loss", permissible_film=1.0), 72.1,
+    ),
+}  # fmt: skip
+
+
+def at_the_start(pair: jg.GearPair, torque, speed) -> jg.MeshCycle:
+    """A single contact at A, with the share of the load that reports of helical gears have there, 1.3 / eps_alpha."""
+    path = path_of_contact(pair)
+    sizes = jg.Resolution(positions=4, slices=1, pairs=2, contact_nodes=1, slide_steps=0)
+    of = kinematics(pair, path.start * (1 - 1e-9) / path.base_pitch, sizes, "strain")
+    none, curve = jnp.zeros((2, 1, 4)), jnp.zeros(4)
+    load = none.at[0, 0, 0].set(1e3 * torque / pair.pinion.base_radius / pair.face_width * 1.3 / path.contact_ratio)
+    force, status = load[:, 0] * pair.face_width, jnp.zeros(4, jnp.int8)
+    point = jg.OperatingPoint(torque, speed)
+    return jg.MeshCycle(
+        of, margins(pair), point, None, None, curve, curve, load, force, none, none, none, none, curve, curve, status
+    )
+
+
+@jax.jit
+def rating(case: Published, rated: Rated) -> dict[str, Any]:
+    """Factors of ISO 6336-1, and what the lubricant makes of the contact at A."""
+    pair = jg.GearPair(*case.gears, case.center_distance)
+    run = {"application_factor": rated.application, "deviations": rated.deviations}
+    vibrating = {**run, "torque": rated.torque, "speed": rated.speed, "tip_relief": rated.relief}
+    mass = jnp.where(rated.mass > 0, rated.mass, iso_dynamic_factor(pair, **vibrating).reduced_mass)
+    dynamic = iso_dynamic_factor(pair, **vibrating, reduced_mass=mass)
+    transverse = transverse_load_factors(
+        pair, rated.torque, **run, dynamic_factor=rated.dynamic, face_load_factor=rated.face
+    )
+    cycle = at_the_start(pair, rated.torque, rated.speed)
+    factor = rated.application * rated.dynamic * rated.face * rated.transverse
+    oil = replace(rated.oil, load_factor=factor)
+    schlenk, flash, film = (
+        metrics.friction_coefficient(cycle, replace(oil, friction=law))
+        for law in ("schlenk", "iso_6336_20", "iso_6336_22")
+    )
+    # the film at the temperature of the report, which has the loss of the geometry in place of that of the contact
+    oil = replace(oil, friction="iso_6336_22")
+    rise = metrics.bulk_temperature(cycle, oil) - oil.temperature
+    oil = replace(oil, cooling_factor=(rated.bulk - oil.temperature) / rise)
+    loss, path = metrics.ohlendorf_loss_factor(pair), path_of_contact(pair)
+    power = rated.torque * rated.speed * jnp.pi / 30
+    pressure = cycle.contact_pressure[0, 0, 0]
+    return {
+        "Ft": metrics.rating_factors(cycle)["tangential_force_N"],
+        "m_red": dynamic.reduced_mass,
+        "n_E1": dynamic.resonance_speed,
+        "N": dynamic.resonance_ratio,
+        "K_v": dynamic.factor,
+        "K_Hbeta": method_c(dynamic.line_load * rated.dynamic, 0.85 * jg.sizing.iso_stiffness(pair).mesh, 6.0, 8.0),
+        "K_Halpha": transverse.contact,
+        "K_Falpha": transverse.root,
+        "K_Bgamma": metrics.helical_load_factor(pair),
+        "H_v": loss,
+        "mu_mz": schlenk,
+        "mu_20": flash,
+        "mu_22": film,
+        "P_VZP": power * schlenk * loss,
+        "eta_zP": 1 - schlenk * loss,
+        "rho_nA": path.reduced_radius(path.start) / jnp.cos(pair.pinion.base_helix_angle),
+        "p_HA": pressure,
+        "p_dynA": pressure * jnp.sqrt(factor),
+        "h_A": metrics.film_thickness(cycle, oil)[0, 0, 0],
+        "lambda_A": metrics.specific_film_thickness(cycle, oil)[0, 0, 0],
+        "S_lambda": metrics.micropitting_safety(cycle, oil)[0, 0, 0],
+    }
+
+
+def tolerances(gears: tuple[jg.Gear, jg.Gear]) -> dict[str, Any]:
+    """Single pitch and base pitch deviations of both gears in class 5 [um]."""
+    pitch = [iso_rounded(ToleranceClass.of(gear, 5).single_pitch) for gear in gears]
+    return {"f_pT": pitch, "f_pb": [of * jnp.cos(gear.transverse_pressure_angle) for of, gear in zip(pitch, gears)]}
+
+
 def found_for(name: str, values: dict[str, Any]) -> float:
     """The number of a row, with the index of a gear or without."""
     return float(values[name]) if name in values else float(values[name[:-1]][int(name[-1]) - 1])
@@ -265,6 +390,11 @@ def found_for(name: str, values: dict[str, Any]) -> float:
 def test_numbers_of_reports(name):
     values, nominal, missed = values_of(name), values_of(name.partition(" ")[0]), []
     values |= {quantity: values[of] - nominal[of] for quantity, of in DIFFERENCES.items()}
+    if name in RATED:
+        values |= rating(*jax.tree.map(jnp.asarray, (SETS[name](), RATED[name])))
+    if name in SPANNED:
+        gears = SETS[name]().gears
+        values |= tolerances(gears) | {"k": [teeth_spanned(gear) for gear in gears]}
     for row in (row for row in ROWS if row["set"] == name and not row["note"]):
         printed, found = float(row["printed"]), found_for(row["quantity"], values)
         half_unit = 0.5 * 10.0 ** -len(row["printed"].partition(".")[2])
