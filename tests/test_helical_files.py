@@ -220,6 +220,7 @@ def test_the_tables_of_a_run_have_the_numbers_of_iso_21771(load):
     wanted |= {"transverse_pressure_angle_deg": 20.646896}
     for name, value in wanted.items():
         assert float(pinion[name]) == pytest.approx(value, abs=6e-5), name
+    assert float(pinion["active_tip_diameter_mm"]) == pytest.approx(float(pinion["tip_diameter_mm"]), rel=1e-12)
     assert float(pair["center_distance_mm"]) == pytest.approx(104.04526, abs=5e-6)
     assert float(pair["overlap_ratio"]) == pytest.approx(0.5492 * 18.0 / 20.0, abs=5e-5)
     assert float(pair["total_contact_ratio"]) == pytest.approx(1.5700 + 0.5492 * 0.9, abs=1e-4)

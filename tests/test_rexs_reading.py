@@ -336,6 +336,23 @@ def test_a_chamfered_tip_by_its_diameter_or_its_height(written):
     assert float(read_rexs(written.path).pair.pinion.tip_form_diameter) == pytest.approx(62.5, abs=1e-12)
 
 
+def test_an_active_tip_ends_a_flank_that_nothing_else_ends(written, caplog):
+    """d_Na of the stage data: below the tip circle it is the tip form circle, equal to it and above it says nothing."""
+    data = '<component id="15" type="cylindrical_stage_gear_data">'
+    assert data in written.text
+
+    def read(value, text=written.text, **given):
+        written.path.write_text(text.replace(data, data + attribute("active_tip_diameter", value)))
+        return read_rexs(written.path, **given).pair.pinion.tip_form_diameter
+
+    assert float(read("62.5")) == 62.5
+    assert "pinion.tip_form_diameter = 62.5 (active_tip_diameter)" in caplog.text
+    assert read("62.999") is None and read("64.0") is None
+    assert float(read("62.5", given={"pinion.tip_form_diameter": 62.7})) == 62.7
+    with pytest.raises(DesignFileError, match="15: active_tip_diameter: 62.5 mm must be 62.8 mm, by the tip form"):
+        read("62.5", written.text.replace(TEETH, attribute("tip_form_diameter", "62.8") + TEETH, 1))
+
+
 TEETH = '<attribute id="number_of_teeth" unit="none">19<'
 HELIX = '<attribute id="helix_angle_reference_diameter" unit="deg">0.0<'
 SHAPE = '<attribute id="shape_of_relief" unit="none">linear<'

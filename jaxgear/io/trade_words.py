@@ -22,7 +22,7 @@ _SAME = {
     "dedendum": "hfpstar hfpcoefficient dedendumcoefficient",
     "root_radius": "rhofpstar rootradiuscoefficient",
     "tip_diameter": "da dk outsidediameter outerdiameter od addendumdiameter",
-    "tip_form_diameter": "dfa dna",
+    "tip_form_diameter": "dfa dna activetipdiameter usabletipdiameter effectivetipdiameter chamferdiameter",
     "bore_diameter": "di bore innerdiameter",
     "root_diameter": "df",
     "root_form_diameter": "dff",
@@ -78,6 +78,9 @@ _OTHER = {
     "rhof rhofp filletradius toolradius": "may be a length in mm: root_radius is a coefficient, radius in mm / module",
     "rootdiameter df": "follows from the rack: dedendum = (d - d_f) / (2 module) + profile_shift",
     "rootformdiameter dff": "follows from the rack and the pressure angle",
+    "activerootdiameter usablerootdiameter effectiverootdiameter dnf sap": (
+        "follows from the mate's tip: end that at its tip_form_diameter"
+    ),
     "referencediameter pitchdiameter operatingpitchdiameter d dw": "follows from teeth, module and helix_angle",
     "basediameter db": "follows from teeth, module, pressure_angle and helix_angle",
     "toothdepth toothheight h": "is the sum of both: give addendum and dedendum as coefficients of the module",

@@ -146,6 +146,7 @@ _GEAR = (
     "root_diameter_mm",
     "root_form_diameter_mm",
     "active_root_diameter_mm",
+    "active_tip_diameter_mm",
     "bore_diameter_mm",
     "tip_land_mm",
     "tip_edge_radius_mm",
@@ -185,9 +186,10 @@ def gears(file: DesignFile) -> dict[str, dict[str, dict[str, Any]]]:
     """What every `summary.json` says of the gears: their geometry with that of the pair, and their drawing data.
 
     Points of the path of contact are positions from the pitch point C, positive towards the tip of the pinion. The
-    usable involute runs from the root form diameter to the tip form diameter, and the mate's tip touches it from the
-    active root diameter on. Of helical gears module and pressure angle are normal ones, and the base pitch and the
-    backlash on the line of action transverse ones.
+    usable involute runs from the root form diameter to the tip form diameter, and the mate touches it from the active
+    root diameter d_Nf to the active tip diameter d_Na, the tip form diameter but where the mate is undercut. Of helical
+    gears module and pressure angle are normal ones, and the base pitch and the backlash on the line of action
+    transverse ones.
     """
     # gears without backlash have it up to rounding, which is no -0
     choices = chosen(file)
@@ -229,17 +231,20 @@ def mounting(file: DesignFile) -> str:
 def _numbers(pair: GearPair, choices):
     contact, room = path_of_contact(pair), margins(pair)
     pitch = contact.pinion_pitch_roll_length, contact.wheel_pitch_roll_length
-    lowest = contact.pinion_roll_length(contact.start), contact.wheel_roll_length(contact.end)
+    active = (
+        (contact.pinion_roll_length(contact.start), contact.pinion_roll_length(contact.end)),
+        (contact.wheel_roll_length(contact.end), contact.wheel_roll_length(contact.start)),
+    )
     shape = (
-        _gear(pair.pinion, pitch[0], lowest[0], room.pinion_tip_clearance),
-        _gear(pair.wheel, pitch[1], lowest[1], room.wheel_tip_clearance),
+        _gear(pair.pinion, pitch[0], active[0], room.pinion_tip_clearance),
+        _gear(pair.wheel, pitch[1], active[1], room.wheel_tip_clearance),
         _together(pair, contact, room.backlash),
     )
     return shape, [numbers(gear, *given) for gear, given in zip(pair.gears, choices)]
 
 
-def _gear(gear: Gear, pitch: Scalar, lowest: Scalar, tip_clearance: Scalar) -> tuple[Scalar, ...]:
-    """`_GEAR` and `_HELICAL_GEAR`, of the roll lengths at the pitch point and at the end of the active profile [mm]."""
+def _gear(gear: Gear, pitch: Scalar, active: tuple[Scalar, Scalar], tip_clearance: Scalar) -> tuple[Scalar, ...]:
+    """`_GEAR` and `_HELICAL_GEAR`, of the roll lengths at the pitch point and the ends of the active profile [mm]."""
     helical = (
         ()
         if gear.helix_angle is None
@@ -265,7 +270,7 @@ def _gear(gear: Gear, pitch: Scalar, lowest: Scalar, tip_clearance: Scalar) -> t
         2 * gear.tip_form_radius,
         2 * gear.root_circle_radius,
         diameter(gear, outline(gear).form_roll_length),
-        diameter(gear, lowest),
+        *(diameter(gear, end) for end in active),
         2 * gear.bore_radius,
         gear.tip_land,
         gear.edge_radius,

@@ -11,8 +11,9 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from ...geometry import GearPair
+from ...geometry import GearPair, diameter, path_of_contact
 from ...microgeometry import AbstractModification, NoModification
+from ...numerics import real
 from ..errors import DesignFileError, naming, refused
 from ..toml import content
 from .container import is_container, unpacked
@@ -28,6 +29,9 @@ _LOG = logging.getLogger("jaxgear")
 _OLDEST, _NEWEST = (1,), (2,)
 _MODIFIED = (1, 4)  # since when modifications of flanks are those of today
 _ALIKE = 1e-9  # um
+_ACTIVE_TIP = "active_tip_diameter"
+_TIPS = "tip_diameter", "tip_form_diameter"
+_ROUNDED = 5e-3  # mm, by which diameters that another program works out may differ
 _LISTED = "jaxgear convert FILE lists its stages"
 _NAMES = "pinion", "wheel"
 _ALONG, _ACROSS = "position_of_profile_modification", "diameter_of_helix_modification"
@@ -166,6 +170,7 @@ def read_stage(model: Model, stage: int | None, flank: str | None, completed: Co
     if OFFSET in completed.given:
         completed.say(OFFSET, offset, "given")
     pair: GearPair = refused(chosen.where(), GearPair, pinion, wheel, distance, axial_offset=offset)
+    pair = _with_active_tips(model, chosen, gears, pair, completed)
     width, common = float(pair.face_width), chosen.number("common_face_width", "mm")
     if common is not None and abs(common - width) > 1e-6 * width:
         centred = "" if offset else f": the gears are centred on each other, or give --set {OFFSET}=MM"
@@ -179,6 +184,29 @@ def read_stage(model: Model, stage: int | None, flank: str | None, completed: Co
     if not pair.is_spur:
         _check_direction(gears, flank, turned, sides, (on_pinion, on_wheel))
     return Stage(chosen, gears, pair, (on_pinion, on_wheel))
+
+
+def _with_active_tips(
+    model: Model, stage: Component, gears: list[Component], pair: GearPair, completed: Completed
+) -> GearPair:
+    """The pair whose flanks end at the active tip diameters of its stage, where no other number ends them there."""
+    said = [[(part, part.number(_ACTIVE_TIP, "mm")) for part in _data(model, stage, gear)] for gear in gears]
+    if not any(value for parts in said for _, value in parts):
+        return pair
+    path = path_of_contact(pair)
+    ends = path.pinion_roll_length(path.end), path.wheel_roll_length(path.start)
+    for name, parts, end in zip(_NAMES, said, ends):
+        gear = getattr(pair, name)
+        reached = float(diameter(gear, end))
+        for part, value in parts:
+            if value is None or value >= reached - _ROUNDED or any(f"{name}.{tip}" in completed.given for tip in _TIPS):
+                continue
+            if gear.tip_form_diameter is not None:
+                raise part.refuse(_ACTIVE_TIP, f"{value:g} mm must be {reached:.6g} mm, by the tip form diameter")
+            ending = refused(part.where(_ACTIVE_TIP), replace, gear, tip_form_diameter=real(value))
+            pair = refused(part.where(_ACTIVE_TIP), replace, pair, **{name: ending})
+            completed.say(f"{name}.tip_form_diameter", value, _ACTIVE_TIP)
+    return pair
 
 
 def _with_given(model: Model, gears: list[Component], completed: Completed) -> list[Component]:
