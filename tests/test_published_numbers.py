@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 import pytest
+from helical_pairs import SIZES
 
 import jaxgear as jg
 from jaxgear import metrics
@@ -311,14 +312,16 @@ RATED: dict[str, Rated] = {
 }  # fmt: skip
 
 
+A = 1, 2, 0  # the middle pair in the middle of the face at the first position
+
+
 def at_the_start(pair: jg.GearPair, torque, speed) -> jg.MeshCycle:
     """A single contact at A, with the share of the load that reports of helical gears have there, 1.3 / eps_alpha."""
     path = path_of_contact(pair)
-    sizes = jg.Resolution(positions=4, slices=1, pairs=2, contact_nodes=1, slide_steps=0)
-    of = kinematics(pair, path.start * (1 - 1e-9) / path.base_pitch, sizes, "strain")
-    none, curve = jnp.zeros((2, 1, 4)), jnp.zeros(4)
-    load = none.at[0, 0, 0].set(1e3 * torque / pair.pinion.base_radius / pair.face_width * 1.3 / path.contact_ratio)
-    force, status = load[:, 0] * pair.face_width, jnp.zeros(4, jnp.int8)
+    of = kinematics(pair, path.start * (1 - 1e-9) / path.base_pitch, SIZES, "strain")
+    none, curve = jnp.zeros((3, 5, 8)), jnp.zeros(8)
+    load = none.at[A].set(1e3 * torque / pair.pinion.base_radius / pair.face_width * 1.3 / path.contact_ratio)
+    force, status = jnp.sum(load, axis=1) * pair.face_width / 5, jnp.zeros(8, jnp.int8)
     point = jg.OperatingPoint(torque, speed)
     return jg.MeshCycle(
         of, margins(pair), point, None, None, curve, curve, load, force, none, none, none, none, curve, curve, status
@@ -349,7 +352,7 @@ def rating(case: Published, rated: Rated) -> dict[str, Any]:
     oil = replace(oil, cooling_factor=(rated.bulk - oil.temperature) / rise)
     loss, path = metrics.ohlendorf_loss_factor(pair), path_of_contact(pair)
     power = rated.torque * rated.speed * jnp.pi / 30
-    pressure = cycle.contact_pressure[0, 0, 0]
+    pressure = cycle.contact_pressure[A]
     return {
         "Ft": metrics.rating_factors(cycle)["tangential_force_N"],
         "m_red": dynamic.reduced_mass,
@@ -369,9 +372,9 @@ def rating(case: Published, rated: Rated) -> dict[str, Any]:
         "rho_nA": path.reduced_radius(path.start) / jnp.cos(pair.pinion.base_helix_angle),
         "p_HA": pressure,
         "p_dynA": pressure * jnp.sqrt(factor),
-        "h_A": metrics.film_thickness(cycle, oil)[0, 0, 0],
-        "lambda_A": metrics.specific_film_thickness(cycle, oil)[0, 0, 0],
-        "S_lambda": metrics.micropitting_safety(cycle, oil)[0, 0, 0],
+        "h_A": metrics.film_thickness(cycle, oil)[A],
+        "lambda_A": metrics.specific_film_thickness(cycle, oil)[A],
+        "S_lambda": metrics.micropitting_safety(cycle, oil)[A],
     }
 
 
