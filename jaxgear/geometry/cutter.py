@@ -6,6 +6,7 @@ signed: those of an internal gear are negative, as in ISO 21771.
 
 from typing import Any, NamedTuple
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 
@@ -58,6 +59,11 @@ class Cutter(NamedTuple):
     def depth(self) -> Number:
         """Of the rounding's centre below the cutter's pitch circle [mm]."""
         return self.center_radius - self.pitch_radius
+
+    @property
+    def offset(self) -> Number:
+        """Arc on the cutter's pitch circle from the middle of its space to the centre of the rounding [mm]."""
+        return self.pitch_radius * self.gap_angle
 
     @property
     def line_length(self) -> Number:
@@ -148,6 +154,32 @@ def full_rounding(cutter_teeth: Number, pressure_angle: Number, cutter_shift: Nu
     return radius
 
 
+def cutter_contact(
+    g: Number, pitch_radius: Number, cutter_radius: Number, offset: Number, depth: Number
+) -> tuple[Number, Number]:
+    """Where the arc at the cutter's tip touches the fillet, on a common normal of the inclination g.
+
+    L = -r_w0 sin(g) + sqrt(c_0^2 - r_w0^2 cos(g)^2), written without a difference (depth / sin(g) of a rack), and
+    phi = (r_w0 theta + offset) / r_w with theta = atan2(L cos(g), r_w0 + L sin(g)). The inclination of the fillet's
+    normal is g - phi.
+
+    Args:
+        g: inclination of the normal to the tangent of the pitch circles [rad].
+        pitch_radius, cutter_radius: r_w and r_w0, on which gear and cutter roll [mm].
+        offset: arc on the latter from the middle of the cutter's space to the centre of its rounding [mm].
+        depth: c_0 - r_w0, of that centre below it [mm].
+
+    Returns:
+        distance from the pitch point to the centre of the rounding [mm], and the angle of the pitch point from the
+        middle of the gear's tooth [rad].
+    """
+    of = _library(depth)
+    power, along = depth * (2 * cutter_radius + depth), cutter_radius * of.sin(g)
+    reach = power / (along + of.sqrt(of.maximum(along**2 + power, (1e-6 * cutter_radius) ** 2)))
+    theta = of.arctan2(reach * of.cos(g), cutter_radius + reach * of.sin(g))
+    return reach, (cutter_radius * theta + offset) / pitch_radius
+
+
 def tangent_of(involute: Number) -> Number:
     """tan(alpha) of inv(alpha) [rad], of NumPy's or JAX's numbers; derivatives of all orders are those of the root."""
     of = _library(involute)
@@ -163,4 +195,4 @@ def _involute(tangent: Number) -> Number:
 
 
 def _library(number: Number) -> Any:
-    return np if isinstance(number, np.ndarray | np.generic) else jnp
+    return jnp if isinstance(number, jax.Array) else np

@@ -21,7 +21,8 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ..numerics import Checked, bracketed_root, program, result, safe_sqrt
+from ..numerics import Checked, bracketed_root, program, result
+from .cutter import cutter_contact
 from .gear import Gear, virtual_gear
 from .involute import half_tooth_angle, involute
 
@@ -75,24 +76,13 @@ class Curves(NamedTuple):
             up = self.climb * jnp.maximum(self.lean - g, 0.0)
             along, depth, g = along - up * jnp.tan(self.lean), depth - up, jnp.maximum(g, self.lean)
         if self.cutter_radius is not None:
-            reach = cutter_reach(g, self.cutter_radius, depth)
-            return self._along_normal(g, self.cutter_turn(g, self.cutter_radius), reach + rounding)
+            reach, phi = cutter_contact(g, r, self.cutter_radius, along, depth)
+            return self._along_normal(g, phi, reach + rounding)
         if self.stretch is not None:  # support point of the ellipse, with half axes of stretch x rounding and rounding
             rounding = rounding / jnp.sqrt((self.stretch * jnp.cos(g)) ** 2 + jnp.sin(g) ** 2)
             along = along - (self.stretch**2 - 1) * rounding * jnp.cos(g)
         phi = (depth / jnp.tan(g) + along) / r
         return self._along_normal(g, phi, depth / jnp.sin(g) + rounding)
-
-    def cutter_turn(self, g: Real, cutter_radius: Real) -> Real:
-        """Angle [rad] from the tooth's centreline to the pitch point where the cutter's arc touches at g.
-
-        Args:
-            g: inclination of the common normal [rad]; the fillet's normal has g less that angle.
-            cutter_radius: on which the cutter rolls [mm].
-        """
-        reach = cutter_reach(g, cutter_radius, self.depth)
-        turned = jnp.arctan2(reach * jnp.cos(g), cutter_radius + reach * jnp.sin(g))
-        return (cutter_radius * turned + self.offset) / self.pitch_radius
 
     def _along_normal(self, g: Real, phi: Real, distance: Real) -> tuple[Real, Real]:
         """Point (x, y) at a distance from the pitch point, which is at the angle phi from the centreline [rad]."""
@@ -179,8 +169,7 @@ def curves(gear: Gear) -> Curves:
     stretch = None if gear.helix_angle is None else 1 / gear.helix_cosine
     cutter = gear.cutter
     if cutter is not None:
-        offset = cutter.pitch_radius * cutter.gap_angle
-        drawn = offset, cutter.depth, cutter.rounding
+        drawn = cutter.offset, cutter.depth, cutter.rounding
         roll = cutter.gear_pitch_radius
         return Curves(roll, gear.base_radius, at_base, gear.tip_roll_length, *drawn, cutter_radius=cutter.pitch_radius)
     lean, climb = None, None
@@ -206,20 +195,6 @@ def rack_tip(gear: Gear) -> tuple[Scalar, Scalar, Scalar]:
         from_rack_centre = from_rack_centre + protruding / jnp.cos(alpha)
     from_centreline = (pitch / 2 - from_rack_centre) / gear.helix_cosine
     return from_centreline, (gear.dedendum - gear.generating_profile_shift) * m - tip, tip
-
-
-def cutter_reach(g: Real, cutter_radius: Real, depth: Real) -> Real:
-    """Distance L [mm] from the pitch point to the centre of the cutter's tip arc, on a normal of the inclination g.
-
-    L = -r_w0 sin(g) + sqrt(c_0^2 - r_w0^2 cos(g)^2), written without a difference: depth / sin(g) of a rack.
-
-    Args:
-        g: inclination of the normal [rad].
-        cutter_radius: r_w0, on which the cutter rolls [mm].
-        depth: c_0 - r_w0, of the centre below that circle [mm].
-    """
-    power, along = depth * (2 * cutter_radius + depth), cutter_radius * jnp.sin(g)
-    return power / (along + safe_sqrt(along**2 + power))
 
 
 def trochoid(gear: Gear, g: Real) -> tuple[Real, Real]:

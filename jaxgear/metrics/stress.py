@@ -23,9 +23,10 @@ from jaxtyping import Array, Float
 from ..compliance.plane import combined_modulus
 from ..contact import MeshCycle, Side
 from ..geometry import Gear, GearPair, path_of_contact
+from ..geometry.cutter import cutter_contact
 from ..geometry.gear import virtual_gear
 from ..geometry.involute import load_angle
-from ..geometry.outline import Curves, curves, cutter_reach, rack_tip
+from ..geometry.outline import Curves, curves, rack_tip
 from ..numerics import Checked, bracketed_root, over_batch, over_slices, result, safe_sqrt
 from .load_distribution import face_load_factor, over_several_slices, root_face_load_factor
 
@@ -177,11 +178,10 @@ def _section_by_cutter(drawn: Curves) -> CriticalSection:
     The radius of curvature is that of the roulette of the tip arc's centre (Euler and Savary) and of the arc:
     rho_F = rho_a0 + L^2 / (L + sin(g) / (1 / r_w + 1 / r_w0)), where the rack has r_w0 = infinity.
     """
-    assert drawn.cutter_radius is not None
     low, high = (jnp.full_like(drawn.depth, end) for end in (_TANGENT, jnp.pi / 2))
     g = bracketed_root(_beyond_tangent, low, high, drawn)
     x, y = drawn.trochoid(g)
-    reach = cutter_reach(g, drawn.cutter_radius, drawn.depth)
+    reach, _ = _contact(g, drawn)
     rolling = drawn.pitch_radius * drawn.cutter_radius / (drawn.pitch_radius + drawn.cutter_radius)
     fillet = drawn.rounding + reach**2 / (reach + rolling * jnp.sin(g))
     return CriticalSection(2 * x, fillet, y)
@@ -189,8 +189,11 @@ def _section_by_cutter(drawn: Curves) -> CriticalSection:
 
 def _beyond_tangent(g: Real, drawn: Curves) -> Real:
     """Inclination of the fillet's tangent at the parameter g beyond that of the critical section [rad]."""
-    assert drawn.cutter_radius is not None
-    return g - drawn.cutter_turn(g, drawn.cutter_radius) - _TANGENT
+    return g - _contact(g, drawn)[1] - _TANGENT
+
+
+def _contact(g: Real, drawn: Curves) -> tuple[Real, Real]:
+    return cutter_contact(g, drawn.pitch_radius, drawn.cutter_radius, drawn.offset, drawn.depth)
 
 
 def _of_normal_section(gear: Gear) -> Gear:

@@ -181,10 +181,6 @@ def _check_known(pair: GearPair) -> None:
             raise ValueError(
                 f"finite_element_compliance: {name} protuberance: must be left out, its fillet is not known here yet"
             )
-        if gear.cutter_teeth is not None:
-            raise ValueError(
-                f"finite_element_compliance: {name} cutter_teeth: must be left out, its fillet is not known here yet"
-            )
 
 
 def _concrete(gear: Gear, plane: Plane) -> tuple[Shape, float]:
