@@ -273,15 +273,16 @@ class Gear(Checked):
 
     @property
     def cutter_room(self) -> Real | None:
-        """What is left for the cutter [mm]: the smallest of three lengths that are not negative where it can be used.
+        """What is left for the cutter [mm]: the smallest of four lengths that are not negative where it can be used.
 
-        Half the width of its tip between both roundings, the height of their centres above its base circle, and the
-        roll length of the gear beyond the tip form circle that its involute reaches. None without a cutter.
+        The radius of the roundings of its tip, half the width between them, the height of their centres above its base
+        circle, and the roll length beyond the gear's tip form circle that its involute reaches. None without a cutter.
         """
         cutter = _cutter(self)
         if cutter is None:
             return None
         rounded = jnp.minimum(cutter.tip_half_width, cutter.center_radius - cutter.base_radius)
+        rounded = jnp.minimum(rounded, cutter.rounding)
         accuracy = _RACK_ACCURACY * self.module
         return jnp.minimum(rounded + accuracy, cutter.line_length - self.tip_roll_length)
 
