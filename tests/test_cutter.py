@@ -178,6 +178,7 @@ def test_cutter_room_tells_traced_gears():
     def made(teeth, shift, radius):
         return gear(60, 0.0, cutter_teeth=teeth, cutter_profile_shift=shift, root_radius=radius)
 
+    jax.jit(lambda width: jg.Gear(25, 3.0, face_width=width, cutter_teeth=30).face_width)(10.0)
     room = jax.jit(lambda *numbers: made(*numbers).cutter_room)
     assert float(room(30.0, 0.0, 0.3)) > 0
     for teeth, shift, radius in ((30.0, 0.0, 0.5), (30.0, 1.5, 0.1), (12.0, 0.0, 0.1)):

@@ -563,9 +563,11 @@ def _cutter_tip_faults(gear: Gear) -> tuple[str, ...]:
 
 def _cutter_reach_faults(gear: Gear, form: float) -> tuple[str, ...]:
     """Whether the involute of a cutter of concrete numbers ends below a tip form diameter [mm], in words."""
-    cutter = _cutter(jax.tree.map(np.asarray, gear))  # compiles nothing
-    if cutter is None:
+    if gear.cutter_teeth is None:
         return ()
+    # compiles nothing; face width and material may be traced
+    cutter = _cutter(jax.tree.map(lambda leaf: leaf if isinstance(leaf, jax.core.Tracer) else np.asarray(leaf), gear))
+    assert cutter is not None
     reached = 2 * float(np.hypot(cutter.gear_base_radius, cutter.line_length))
     if reached * (1 + _CUTTER_ACCURACY) >= form:
         return ()

@@ -182,6 +182,7 @@ def _section_by_cutter(drawn: Curves) -> CriticalSection:
     g = bracketed_root(_beyond_tangent, low, high, drawn)
     x, y = drawn.trochoid(g)
     reach, _ = _contact(g, drawn)
+    assert drawn.cutter_radius is not None
     rolling = drawn.pitch_radius * drawn.cutter_radius / (drawn.pitch_radius + drawn.cutter_radius)
     fillet = drawn.rounding + reach**2 / (reach + rolling * jnp.sin(g))
     return CriticalSection(2 * x, fillet, y)
