@@ -68,6 +68,8 @@ class Margins(Checked):
             margin: it must not be positive, and is zero without chamfers.
         overlap_ratio: of the faces.
         accuracy: by how much clearances of the form circles and backlash may lie below zero.
+        pinion_cutter_room, wheel_cutter_room: `cutter_room` of the gears [mm], at least zero up to rounding; None of a
+            gear that a rack generates.
     """
 
     pinion_tip_land: Scalar = result("mm")
@@ -90,6 +92,8 @@ class Margins(Checked):
     tip_overrun: Scalar = eqx.field(repr=False)
     overlap_ratio: Scalar = eqx.field(repr=False)
     accuracy: Accuracy = eqx.field(repr=False)
+    pinion_cutter_room: Scalar | None = eqx.field(default=None, repr=False)
+    wheel_cutter_room: Scalar | None = eqx.field(default=None, repr=False)
 
     @property
     def held(self) -> dict[str, Bool[Array, "..."]]:
@@ -99,6 +103,9 @@ class Margins(Checked):
             for side in ("pinion", "wheel")
             for name in ("tip_height", "tip_land", "rim_thickness")
         }
+        for side, room in (("pinion", self.pinion_cutter_room), ("wheel", self.wheel_cutter_room)):
+            if room is not None:
+                shape[f"{side}_cutter_room"] = room >= -_OUTLINE_ACCURACY
         return shape | {
             "tip_overrun": self.tip_overrun <= CHAMFER_ACCURACY,
             "base_pitch_difference": self.base_pitch_difference <= _DISTANCE_ACCURACY,
@@ -157,6 +164,8 @@ def margins_between(
             # dj / da = 2 sin(alpha_w)
             backlash=2e3 * _DISTANCE_ACCURACY * both * tangent,
         ),
+        pinion_cutter_room=first.cutter_room,
+        wheel_cutter_room=second.cutter_room,
     )
 
 

@@ -1,4 +1,4 @@
-"""The rack-generated tooth outline: trochoid fillet joined to the involute, undercut included.
+"""The tooth outline that a rack or a cutter generates: trochoid fillet joined to the involute, undercut included.
 
 Of helical gears it is that of the transverse section. The basic rack is that of the normal section: in the transverse
 one it is 1 / cos(beta) times as long along its pitch line, which makes an ellipse of the circle at its tip.
@@ -8,6 +8,10 @@ rack's tip, in the parameter g, the inclination of the common normal, which runs
 the root circle, g = pressure angle where a tooth without undercut passes into the involute. A protuberance of the tool
 cuts that involute off higher up. Its flank is where the tip arc ends; there the normal keeps its direction, and g below
 the inclination of that flank counts the way along it.
+
+The trochoid of a pinion-type cutter is the envelope of the arc at its tip, in the same parameter; the pitch point is
+then that of cutter and gear, and the junction without undercut at their generating pressure angle. A rack is a cutter
+with infinitely many teeth.
 """
 
 from typing import NamedTuple
@@ -18,6 +22,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..numerics import Checked, bracketed_root, program, result
+from .cutter import cutter_contact
 from .gear import Gear, virtual_gear
 from .involute import half_tooth_angle, involute
 
@@ -36,13 +41,15 @@ class Curves(NamedTuple):
     each of these numbers, instead of wherever a number meets a point, and each sum is a loop to compile.
 
     Attributes:
-        pitch_radius, base_radius: [mm].
+        pitch_radius: on which the gear rolls with its tool [mm].
+        base_radius: [mm].
         base_half_angle: half tooth angle on the base circle [rad].
         tip_roll_length: where the involute ends [mm].
         offset, depth, rounding: `rack_tip` [mm].
         stretch: 1 / cos(beta), length of the transverse rack over that of the normal one; None of a spur gear.
         lean: inclination of the flank of the tool's protuberance [rad]; None without protuberance.
         climb: depth along that flank over g [mm/rad]; likewise.
+        cutter_radius: on which a cutter rolls with the gear [mm]; None of a rack.
     """
 
     pitch_radius: Real
@@ -55,6 +62,7 @@ class Curves(NamedTuple):
     stretch: Real | None = None
     lean: Real | None = None
     climb: Real | None = None
+    cutter_radius: Real | None = None
 
     def over(self, shape: tuple[int, ...]) -> "Curves":
         """The same numbers at every point of an array."""
@@ -67,11 +75,18 @@ class Curves(NamedTuple):
         if self.lean is not None and self.climb is not None:
             up = self.climb * jnp.maximum(self.lean - g, 0.0)
             along, depth, g = along - up * jnp.tan(self.lean), depth - up, jnp.maximum(g, self.lean)
+        if self.cutter_radius is not None:
+            reach, phi = cutter_contact(g, r, self.cutter_radius, along, depth)
+            return self._along_normal(g, phi, reach + rounding)
         if self.stretch is not None:  # support point of the ellipse, with half axes of stretch x rounding and rounding
             rounding = rounding / jnp.sqrt((self.stretch * jnp.cos(g)) ** 2 + jnp.sin(g) ** 2)
             along = along - (self.stretch**2 - 1) * rounding * jnp.cos(g)
         phi = (depth / jnp.tan(g) + along) / r
-        distance = depth / jnp.sin(g) + rounding
+        return self._along_normal(g, phi, depth / jnp.sin(g) + rounding)
+
+    def _along_normal(self, g: Real, phi: Real, distance: Real) -> tuple[Real, Real]:
+        """Point (x, y) at a distance from the pitch point, which is at the angle phi from the centreline [rad]."""
+        r = self.pitch_radius
         return r * jnp.sin(phi) - distance * jnp.cos(g - phi), r * jnp.cos(phi) - distance * jnp.sin(g - phi)
 
     def half_angle(self, rho: Real) -> Real:
@@ -125,11 +140,10 @@ class Outline(Checked):
 def outline(gear: Gear) -> Outline:
     """Generates the outline of one gear, in the transverse section.
 
-    Equations: the trochoid of the rack's tip arc in the frame of the tooth centreline, as in ISO 6336-3 (tool tip
-        centre
-    E) written as a curve; its junction angle equals the involute's half tooth angle at d_Ff (ISO 21771).
+    Equations: the trochoid of the tool's tip arc in the frame of the tooth centreline, as in ISO 6336-3 (tool tip
+    centre E) written as a curve; its junction angle equals the involute's half tooth angle at d_Ff (ISO 21771).
     """
-    alpha, drawn = gear.transverse_pressure_angle, curves(gear)
+    alpha, drawn = _generating_angle(gear), curves(gear)
     end_x, end_y = drawn.trochoid(jnp.full_like(alpha, jnp.pi / 2))
     tangential = _tangential_form_roll_length(gear)
     # at the limit of undercut both junctions lie on the base circle; rounding must not choose between them
@@ -153,6 +167,11 @@ def curves(gear: Gear) -> Curves:
     """The numbers that the outline of a gear is drawn by."""
     at_base = half_tooth_angle(gear, jnp.zeros_like(gear.base_radius))
     stretch = None if gear.helix_angle is None else 1 / gear.helix_cosine
+    cutter = gear.cutter
+    if cutter is not None:
+        drawn = cutter.offset, cutter.depth, cutter.rounding
+        roll = cutter.gear_pitch_radius
+        return Curves(roll, gear.base_radius, at_base, gear.tip_roll_length, *drawn, cutter_radius=cutter.pitch_radius)
     lean, climb = None, None
     if gear.protuberance is not None:
         lean = jnp.arctan(jnp.tan(0.5 * jnp.deg2rad(gear.pressure_angle)) / gear.helix_cosine)
@@ -188,8 +207,15 @@ def involute_point(gear: Gear, rho: Real) -> tuple[Real, Real]:
     return curves(gear).over(jnp.shape(rho)).involute(rho)
 
 
+def _generating_angle(gear: Gear) -> Scalar:
+    """Parameter g at which fillet and involute meet without undercut [rad]: alpha_t, or alpha_w0 of a cutter."""
+    return gear.transverse_pressure_angle if gear.cutter is None else jnp.arctan(gear.cutter.tangent)
+
+
 def _tangential_form_roll_length(gear: Gear) -> Scalar:
     """Roll length of the junction at g = pressure angle [mm], of d_Ff in ISO 21771; negative in undercut."""
+    if gear.cutter is not None:
+        return gear.cutter.form_roll_length
     alpha, rounded = gear.transverse_pressure_angle, 1 - jnp.sin(jnp.deg2rad(gear.pressure_angle))
     straight = gear.dedendum - gear.generating_profile_shift - gear.root_radius * rounded
     return gear.pitch_radius * jnp.sin(alpha) - straight * gear.module / jnp.sin(alpha)

@@ -21,6 +21,8 @@ _SAME = {
     "addendum": "hapstar hapcoefficient addendumcoefficient",
     "dedendum": "hfpstar hfpcoefficient dedendumcoefficient",
     "root_radius": "rhofpstar rootradiuscoefficient",
+    "cutter_teeth": "z0 teethofcutter shaperteeth shapercutterteeth pinioncutterteeth",
+    "cutter_profile_shift": "x0 shaperprofileshift cutterprofileshiftcoefficient",
     "tip_diameter": "da dk outsidediameter outerdiameter od addendumdiameter",
     "tip_form_diameter": "dfa dna activetipdiameter usabletipdiameter effectivetipdiameter chamferdiameter",
     "bore_diameter": "di bore innerdiameter",
@@ -76,6 +78,10 @@ _OTHER = {
     "ha hap addendumheight": "may be a length in mm: addendum is a coefficient, height of the rack in mm / module",
     "hf hfp dedendumheight": "may be a length in mm: dedendum is a coefficient, depth of the rack in mm / module",
     "rhof rhofp filletradius toolradius": "may be a length in mm: root_radius is a coefficient, radius in mm / module",
+    "da0 dk0 cuttertipdiameter cutteroutsidediameter": (
+        "follows from the cutter: dedendum = (d_a0 / module - cutter_teeth) / 2 - cutter_profile_shift"
+    ),
+    "rhoa0 cuttertipradius": "is a length in mm: root_radius = radius in mm / module",
     "rootdiameter df": "follows from the rack: dedendum = (d - d_f) / (2 module) + profile_shift",
     "rootformdiameter dff": "follows from the rack and the pressure angle",
     "activerootdiameter usablerootdiameter effectiverootdiameter dnf sap": (
@@ -112,7 +118,7 @@ _OTHER = {
 }
 _ADVICE = {word: advice for words, advice in _OTHER.items() for word in words.split()}
 _TABLES = "teeth", "torque", "center_distance", "pinion"  # a key of each of the tables that these words belong to
-_COEFFICIENTS = "addendum", "dedendum", "root_radius", "profile_shift"
+_COEFFICIENTS = "addendum", "dedendum", "root_radius", "profile_shift", "cutter_profile_shift"
 _PART, _WHOLE = 0.7, 0.85  # similarity of a misspelt part, and of a name with its parts run together
 
 

@@ -8,6 +8,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..geometry import Gear, outline
+from ..geometry.gear import full_radius, has_full_radius
 from ..numerics import Checked, concrete, number, safe_sqrt
 
 Scalar = Float[Array, ""]
@@ -28,7 +29,7 @@ class ToothProfile(Checked):
         root_diameter: root diameter d_f [mm] of the tooth with its mean thickness, in place of `dedendum`.
         root_form_diameter: root form diameter d_Ff [mm] of that tooth, in place of `root_radius`; of a tooth without
             undercut.
-        full_root_radius: True if one arc rounds the whole tip of the rack, in place of `root_radius`:
+        full_root_radius: True if one arc rounds the whole tip of the tool, in place of `root_radius`; of a rack
             rho_fP = (pi / 4 - h_fP tan(alpha_n)) cos(alpha_n) / (1 - sin(alpha_n)).
         tip_chamfer: radial height h_K of the tip's chamfer or rounding, coefficient of the module, in place of
             `tip_form_diameter`.
@@ -47,26 +48,30 @@ class ToothProfile(Checked):
 def with_profile(gear: Gear, profile: ToothProfile) -> Gear:
     """The gear with tip and root of a drawing in place of its own.
 
-    Equations: d_f = d - 2 m_n (h_fP - x_E); d_Ff as in `outline`, with 1 - sin(alpha_n) times rho_fP (ISO 21771);
-        d_Fa = d_a - 2 h_K.
+    Equations: d_f = d - 2 m_n (h_fP - x_E), of a cutter 2 a_0 - d_a0; d_Ff as in `outline`, with 1 - sin(alpha_n)
+        times rho_fP (ISO 21771); d_Fa = d_a - 2 h_K.
 
     Raises:
-        ValueError: for what no rack makes, naming the key of the drawing and the coefficient.
+        ValueError: for what no tool makes, naming the key of the drawing and the coefficient.
     """
     if (chamfer := profile.tip_chamfer) is not None:
         form = 2 * (gear.tip_radius - chamfer * gear.module)
         gear = _named("tip_chamfer", lambda: replace(gear, tip_form_diameter=form))
     if (root := profile.root_diameter) is not None:
-        dedendum = gear.generating_profile_shift + (gear.pitch_radius - 0.5 * root) / gear.module
+        if gear.cutter_teeth is None:
+            dedendum = gear.generating_profile_shift + (gear.pitch_radius - 0.5 * root) / gear.module
+        else:
+            dedendum = gear.dedendum + (gear.root_circle_radius - 0.5 * root) / gear.module
+            if has_full_radius(gear):  # of the dedendum that is replaced
+                gear = replace(gear, root_radius=jnp.zeros_like(gear.module))
+                profile = replace(profile, full_root_radius=profile.root_form_diameter is None)
         if (
             profile.root_form_diameter is not None or profile.full_root_radius
         ):  # the gear's rounding is not the drawing's
             gear = replace(gear, root_radius=jnp.zeros_like(gear.module))
         gear = _named("root_diameter", lambda: replace(gear, dedendum=dedendum))
     if profile.full_root_radius:
-        alpha = jnp.deg2rad(gear.pressure_angle)
-        half_width = jnp.pi / 4 - gear.dedendum * jnp.tan(alpha)
-        gear = replace(gear, root_radius=half_width * jnp.cos(alpha) / (1 - jnp.sin(alpha)))
+        gear = replace(gear, root_radius=full_radius(gear))
     if profile.root_form_diameter is not None:
         radius = _root_radius(gear, profile.root_form_diameter)
         gear = _named("root_form_diameter", lambda: replace(gear, root_radius=radius))
@@ -76,9 +81,15 @@ def with_profile(gear: Gear, profile: ToothProfile) -> Gear:
 
 
 def _root_radius(gear: Gear, form_diameter: Scalar) -> Scalar:
-    """rho_fP of a root form diameter [mm], coefficient of the module."""
+    """rho_fP of a root form diameter [mm], coefficient of the module.
+
+    Of a cutter (r_a0^2 - r_b0^2 - rho^2) / (2 (r_a0 - rho)), rho the roll length of its own that touches there.
+    """
     sine = jnp.sin(gear.transverse_pressure_angle)
     roll = safe_sqrt((0.5 * form_diameter) ** 2 - gear.base_radius**2)
+    if (cutter := gear.cutter) is not None:
+        own = cutter.line_length - roll
+        return (cutter.tip_radius**2 - cutter.base_radius**2 - own**2) / (2 * (cutter.tip_radius - own) * gear.module)
     straight = (gear.pitch_radius * sine - roll) * sine / gear.module
     depth = gear.dedendum - gear.generating_profile_shift
     return (depth - straight) / (1 - jnp.sin(jnp.deg2rad(gear.pressure_angle)))

@@ -23,10 +23,11 @@ from jaxtyping import Array, Float
 from ..compliance.plane import combined_modulus
 from ..contact import MeshCycle, Side
 from ..geometry import Gear, GearPair, path_of_contact
+from ..geometry.cutter import cutter_contact
 from ..geometry.gear import virtual_gear
 from ..geometry.involute import load_angle
-from ..geometry.outline import rack_tip
-from ..numerics import Checked, over_batch, over_slices, result, safe_sqrt
+from ..geometry.outline import Curves, curves, rack_tip
+from ..numerics import Checked, bracketed_root, over_batch, over_slices, result, safe_sqrt
 from .load_distribution import face_load_factor, over_several_slices, root_face_load_factor
 
 Scalar = Float[Array, ""]
@@ -111,6 +112,7 @@ def contact_factor_squares(pair: GearPair) -> ContactFactors:
 Real = Float[Array, "..."]
 Load = Float[Array, "pairs slices positions"]
 
+_TANGENT = jnp.pi / 6  # of the critical section, against the centreline [rad]
 _SECTION_STEPS = 8  # fixed-point steps of ISO 6336-3 for theta; it gains two digits per step
 _NOTCH_LIMITS = (1.0, 8.0)  # validity of Y_S in the notch parameter q_s
 _OBLIQUE, _MOST_OBLIQUE = 120.0, 30.0  # deg; Y_beta = 1 - eps_beta beta / 120 deg, beta at most 30 deg
@@ -157,6 +159,8 @@ class NominalRootStress(Checked):
 def critical_section(gear: Gear) -> CriticalSection:
     """Section of the generated root at the 30 degree tangent; of helical gears that of the normal section."""
     gear = _of_normal_section(gear)
+    if gear.cutter is not None:
+        return _section_by_cutter(curves(gear))
     m, z = gear.module, gear.teeth
     offset, below, radius = (length / m for length in rack_tip(gear))
     g, h = -below, 2 / z * offset - jnp.pi / 3
@@ -166,6 +170,31 @@ def critical_section(gear: Gear) -> CriticalSection:
     fillet = radius + 2 * g**2 / (jnp.cos(theta) * (z * jnp.cos(theta) ** 2 - 2 * g))
     depth = 0.5 * (z * jnp.cos(jnp.pi / 3 - theta) + reach)
     return CriticalSection(chord * m, fillet * m, depth * m)
+
+
+def _section_by_cutter(drawn: Curves) -> CriticalSection:
+    """Where the tangent of the fillet has 30 degrees, by a root search.
+
+    The radius of curvature is that of the roulette of the tip arc's centre (Euler and Savary) and of the arc:
+    rho_F = rho_a0 + L^2 / (L + sin(g) / (1 / r_w + 1 / r_w0)), where the rack has r_w0 = infinity.
+    """
+    low, high = (jnp.full_like(drawn.depth, end) for end in (_TANGENT, jnp.pi / 2))
+    g = bracketed_root(_beyond_tangent, low, high, drawn)
+    x, y = drawn.trochoid(g)
+    reach, _ = _contact(g, drawn)
+    assert drawn.cutter_radius is not None
+    rolling = drawn.pitch_radius * drawn.cutter_radius / (drawn.pitch_radius + drawn.cutter_radius)
+    fillet = drawn.rounding + reach**2 / (reach + rolling * jnp.sin(g))
+    return CriticalSection(2 * x, fillet, y)
+
+
+def _beyond_tangent(g: Real, drawn: Curves) -> Real:
+    """Inclination of the fillet's tangent at the parameter g beyond that of the critical section [rad]."""
+    return g - _contact(g, drawn)[1] - _TANGENT
+
+
+def _contact(g: Real, drawn: Curves) -> tuple[Real, Real]:
+    return cutter_contact(g, drawn.pitch_radius, drawn.cutter_radius, drawn.offset, drawn.depth)
 
 
 def _of_normal_section(gear: Gear) -> Gear:

@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ..geometry import Gear, GearPair, PathOfContact, diameter, margins, outline, path_of_contact
-from ..geometry.gear import has_full_radius
+from ..geometry.gear import has_full_radius, tool_name
 from ..io import DesignFile
 from ..io.tolerance_table import quality_classes
 from ..manufacture import measures
@@ -214,11 +214,11 @@ def mounting(file: DesignFile) -> str:
         guess = "" if gear.bore_diameter is not None else " (half the root diameter, as none is given)"
         texts.append(f"{name} {float(shape[name]['bore_diameter_mm']):.4g} mm{guess}")
     full = [
-        f"{name} {float(gear.root_radius):.4g} x module"
+        f"{name} {float(gear.root_radius):.4g} x module (full radius of the {tool_name(gear)})"
         for name, gear in (("pinion", file.pair().pinion), ("wheel", file.pair().wheel))
         if has_full_radius(gear)
     ]
-    rack = f"; root radius: {', '.join(full)} (full radius of the rack)" if full else ""
+    rack = f"; root radius: {', '.join(full)}" if full else ""
     pair = shape["pair"]
     mounted = f"centre distance {float(pair['center_distance_mm']):.6g} mm"
     helical = "normal_backlash_um" in pair  # as pair.backlash has it

@@ -31,6 +31,7 @@ _HELD = (
     "tooth_thickness_allowance",
     "tooth_thickness_tolerance",
 )
+_CUTTER = "cutter_teeth", "cutter_profile_shift"  # likewise, where there is one
 
 _WORDS = {
     "tip_ratio": "tip_diameter over 2 module",
@@ -39,12 +40,14 @@ _WORDS = {
     "allowance": "tooth_thickness_allowance over module",
 }
 
+_ALLOWANCE = Shape._fields.index("allowance")
+
 
 class GearTable(eqx.Module):
     """Deflection of one gear along its load lines, bore fixed; roll lengths from the form circle to the tip.
 
     Attributes:
-        shape: numbers of the gear that it is for, in the order of `Shape`.
+        shape: `numbers` of the `Shape` of the gear that it is for.
         module: that it is for [mm].
         modulus: of the plane problem, E', that it is for [MPa].
         roll_length: increasing [mm], shape (points,).
@@ -93,7 +96,7 @@ def gear_table(shape: Shape, module: float, modulus: float, numbers: GearNumbers
     unit = np.eye(len(numbers.roll_length))
     slopes = scipy.interpolate.CubicSpline(numbers.roll_length, unit)(numbers.roll_length, 1)
     return GearTable(
-        shape=real(np.asarray(shape)),
+        shape=real(np.asarray(shape.numbers)),
         module=real(module),
         modulus=real(modulus),
         roll_length=real(numbers.roll_length),
@@ -113,7 +116,8 @@ def scaled(shape: Shape, numbers: GearNumbers, hub: float, module: float, modulu
 
 
 def shape_of(gear: Gear, plane: Plane) -> Float[Array, " numbers"]:
-    """The numbers that a gear's table depends on, in the order of `Shape`; they may be traced."""
+    """The `numbers` of the `Shape` that a gear's table depends on; they may be traced."""
+    cutter = [getattr(gear, name) for name in _CUTTER] if gear.cutter_teeth is not None else []
     return jnp.stack(
         [
             gear.teeth,
@@ -125,6 +129,7 @@ def shape_of(gear: Gear, plane: Plane) -> Float[Array, " numbers"]:
             gear.bore_radius / gear.module,
             plane_poisson(gear.material, plane),
             1e-3 * gear.mean_tooth_thickness_allowance / gear.module,
+            *cutter,
         ]
     )
 
@@ -144,15 +149,17 @@ class Scale(eqx.Module):
     def of(cls, table: GearTable, gear: Gear, plane: Plane) -> "Scale":
         gear = _without_unknown_derivatives(gear)
         given = jax.lax.stop_gradient(shape_of(gear, plane))
+        if given.shape != table.shape.shape:  # one is of a rack, the other of a cutter
+            return cls(table.module / gear.module, jnp.full_like(gear.module, jnp.nan))
         apart = jnp.abs(given - table.shape) / jnp.maximum(jnp.abs(table.shape), 1.0)
         # a module that moves the tooth thickness against it has no derivative: NaN, as only the number tells
-        factor = table.modulus / plane_modulus(gear.material, plane) + _unknown_slope(shape_of(gear, plane)[-1])
+        factor = table.modulus / plane_modulus(gear.material, plane) + _unknown_slope(shape_of(gear, plane)[_ALLOWANCE])
         return cls(table.module / gear.module, jnp.where(jnp.any(apart > _ALIKE), jnp.nan, factor))
 
 
 def different(table: GearTable, shape: Shape) -> str | None:
     """The first number of a gear that is not that of its table, in words; both are concrete."""
-    numbers = [*zip(Shape._fields, np.asarray(table.shape, float), shape)]
+    numbers = [*zip(Shape._fields, Shape(*map(float, np.asarray(table.shape, float))), shape)]
     # a bore that is not given follows from the others: last, as it is not the reason
     for name, there, here in sorted(numbers, key=lambda number: number[0] == "bore_ratio"):
         if abs(here - there) > _ALIKE * max(abs(there), 1.0):
@@ -162,7 +169,8 @@ def different(table: GearTable, shape: Shape) -> str | None:
 
 def _without_unknown_derivatives(gear: Gear) -> Gear:
     """The gear; whoever asks for a derivative by a number that shapes it is refused."""
-    held = {name: _held(name, getattr(gear, name)) for name in _HELD}
+    names = _HELD if gear.cutter_teeth is None else (*_HELD, *_CUTTER)
+    held = {name: _held(name, getattr(gear, name)) for name in names}
     ratios = [name for name in ("tip_diameter", "bore_diameter") if getattr(gear, name) is not None]
     held |= {name: _held(name, getattr(gear, name)) for name in ratios}
     if ratios:  # the module moves their ratio to it
@@ -170,10 +178,10 @@ def _without_unknown_derivatives(gear: Gear) -> Gear:
     else:
         held["addendum"] = _held("addendum", gear.addendum)
     poisson = _held("poisson_ratio", gear.material.poisson_ratio)
-    names = [*held, "material"]
+    replaced = [*held, "material"]
     material = eqx.tree_at(lambda m: m.poisson_ratio, gear.material, poisson)
     return eqx.tree_at(
-        lambda g: [getattr(g, name) for name in names], gear, [*held.values(), material], is_leaf=lambda x: x is None
+        lambda g: [getattr(g, name) for name in replaced], gear, [*held.values(), material], is_leaf=lambda x: x is None
     )
 
 

@@ -9,6 +9,8 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 import scipy  # its packages load when they are used
 
+from ...geometry.cutter import Cutter, cutter_contact, rolling
+
 _DIGITS = 7  # significant ones of the numbers, so that both precisions mean the same table
 
 
@@ -22,6 +24,7 @@ class Shape(NamedTuple):
         tip_ratio, bore_ratio: radii of tip and bore over the module.
         poisson: Poisson's ratio of the plane problem.
         allowance: of the tooth thickness over the module.
+        cutter_teeth, cutter_profile_shift: as in `Gear`; 0 teeth for a rack.
     """
 
     teeth: float
@@ -33,6 +36,13 @@ class Shape(NamedTuple):
     bore_ratio: float
     poisson: float
     allowance: float = 0.0
+    cutter_teeth: float = 0.0
+    cutter_profile_shift: float = 0.0
+
+    @property
+    def numbers(self) -> tuple[float, ...]:
+        """Those that tell gears apart: without the cutter's where a rack generates the tooth."""
+        return tuple(self) if self.cutter_teeth else tuple(self[:-2])
 
     def rounded(self) -> "Shape":
         """Seven significant digits: what single precision holds."""
@@ -61,11 +71,15 @@ class Tooth:
         self._shift = shape.profile_shift + 0.5 * shape.allowance / np.tan(alpha)  # x_E of `Gear`
         self.root = self.pitch + self._shift - shape.dedendum
         self.tip, self.bore = shape.tip_ratio, shape.bore_ratio
+        cutter = self._cutter = self._rolling()
         turn = (np.pi / 2 + 2 * self._shift * np.tan(alpha)) / shape.teeth
         self._base_half_angle = turn + np.tan(alpha) - alpha
         arc = shape.root_radius
         land = np.pi / 4 - shape.dedendum * np.tan(alpha) - (1 - np.sin(alpha)) * arc / np.cos(alpha)
         self._offset, self._depth = np.pi / 2 - land, shape.dedendum - self._shift - arc
+        if cutter is not None:
+            self.root = float(cutter.root_circle_radius)
+            self._alpha = float(np.arctan(cutter.tangent))
         self.tip_roll_length = float(np.sqrt(max(self.tip**2 - self.base**2, 0.0)))
         self.junction, self.form_roll_length = self._junction()
         end = self.trochoid(np.pi / 2)
@@ -81,6 +95,10 @@ class Tooth:
         r = self.pitch
         phi = (self._depth / np.tan(g) + self._offset) / r
         distance = self._depth / np.sin(g) + self.shape.root_radius
+        if (cutter := self._cutter) is not None:
+            r = float(cutter.gear_pitch_radius)
+            reach, phi = cutter_contact(g, r, cutter.pitch_radius, cutter.offset, cutter.depth)
+            distance = reach + self.shape.root_radius
         return np.stack([r * np.sin(phi) - distance * np.cos(g - phi), r * np.cos(phi) - distance * np.sin(g - phi)])
 
     def half_angle(self, rho: OneOrMany) -> OneOrMany:
@@ -113,11 +131,29 @@ class Tooth:
         alpha = self._alpha
         straight = self.shape.dedendum - self._shift - self.shape.root_radius * (1 - np.sin(alpha))
         tangential = self.pitch * np.sin(alpha) - straight / np.sin(alpha)
+        if self._cutter is not None:
+            tangential = self._cutter.form_roll_length
         if tangential > -1e-12 * self.pitch:
             return float(alpha), max(float(tangential), 0.0)
         at_base = scipy.optimize.brentq(lambda g: np.hypot(*self.trochoid(g)) - self.base, alpha, np.pi / 2)
         cut = scipy.optimize.brentq(self._beside_involute, alpha, at_base)
         return float(cut), float(np.sqrt(max(np.sum(self.trochoid(cut) ** 2) - self.base**2, 0.0)))
+
+    def _rolling(self) -> Cutter | None:
+        """The cutter in mesh with the gear; None of a rack."""
+        shape = self.shape
+        if not shape.cutter_teeth:
+            return None
+        return rolling(
+            shape.teeth,
+            shape.cutter_teeth,
+            module=1.0,
+            pressure_angle=shape.pressure_angle,
+            generating_shift=self._shift,
+            cutter_shift=shape.cutter_profile_shift,
+            height=shape.dedendum,
+            radius=shape.root_radius,
+        )
 
     def _beside_involute(self, g: float) -> float:
         x, y = self.trochoid(g)

@@ -30,7 +30,7 @@ def cached(folder: Path | None, shape: Shape, build: Callable[[Shape], GearNumbe
     except OSError as error:
         raise ValueError(f"finite_element_compliance: cache = {str(folder)!r}: {error.strerror}") from error
     files = KeptFiles(folder, f"finite elements {VERSION}".encode())
-    made_of = json.dumps(shape).encode()
+    made_of = json.dumps(shape.numbers).encode()
     content = files.read(made_of)
     if content is not None:
         with np.load(io.BytesIO(content)) as arrays:

@@ -79,6 +79,9 @@ def write_rexs(
     for name, gear in zip(("pinion", "wheel"), pair.gears):
         if gear.protuberance is not None:
             raise ValueError(f"write_rexs: {name} protuberance: must be left out, it is not written yet")
+        if gear.cutter_teeth is not None:
+            problem = f"{float(gear.cutter_teeth):g} must be left out: tools are written as racks alone"
+            raise ValueError(f"write_rexs: {name} cutter_teeth = {problem}")
     model = Model(_VERSION)
     title = "".join(letter for letter in title if letter.isprintable())
     unit = model.add("gear_unit", model_name=(title or None, "none"))
