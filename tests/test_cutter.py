@@ -11,6 +11,7 @@ import jaxgear as jg
 from jaxgear.compliance.finite_element.compliance_table import shape_of
 from jaxgear.compliance.finite_element.shape import Shape, Tooth
 from jaxgear.geometry import outline
+from jaxgear.geometry.cutter import full_rounding, rolling
 from jaxgear.io import DesignFileError
 from jaxgear.manufacture import drawn_gear
 from jaxgear.metrics.stress import critical_section
@@ -70,6 +71,25 @@ def test_a_rack_is_a_cutter_with_many_teeth():
         ):
             assert float(one) == pytest.approx(float(other), rel=1e-5 if teeth == 25 else 2e-5)
         assert float(first.undercut) == float(second.undercut) == (teeth == 12)
+
+
+@pytest.mark.parametrize(
+    ("teeth", "cutter_teeth", "module", "angle", "height", "radius", "root", "form"),
+    [
+        (64, 25, 3.0, 20.0, 1.25, 0.25, 199.5, 197.9505),
+        (48, 24, 2.0, 25.0, 1.05, 0.2, 100.2, 99.5919),
+        (91, 30, 2.0, 20.0, 1.6, 0.0502, 188.4, 187.4021),  # full radius of the cutter
+    ],
+)
+def test_internal_gears_are_those_of_negative_teeth(teeth, cutter_teeth, module, angle, height, radius, root, form):
+    """Root and form diameters of rings, found from their outlines."""
+    cutter = rolling(
+        -teeth, cutter_teeth, module=module, pressure_angle=angle, generating_shift=0.0, cutter_shift=0.0,
+        height=height, radius=radius,
+    )  # fmt: skip
+    assert -2 * cutter.root_circle_radius == pytest.approx(root, rel=1e-12)
+    assert 2 * np.hypot(cutter.gear_base_radius, cutter.form_roll_length) == pytest.approx(form, abs=1e-4)
+    assert full_rounding(30, 20.0, 0.0, 1.6) == pytest.approx(0.0502, abs=5e-5)
 
 
 def cutter_tooth(made):
