@@ -44,8 +44,8 @@ class Case:
     bound: float
 
 
-CASES = Case(1000, 20, 10.0), Case(1, 200, 5.0)
-QUICK = Case(100, 20, 1.0), Case(1, 20, 0.5)
+CASES = Case(1000, 20, 80.0), Case(1, 200, 5.0)
+QUICK = Case(100, 20, 8.0), Case(1, 20, 0.5)
 
 
 def lives(mesh: jg.Mesh, case: Case) -> Callable[[jax.Array], tuple[jax.Array, jax.Array]]:
