@@ -38,7 +38,7 @@ PASSES = "while-loop-constant-sinking,while-loop-invariant-code-motion"
 
 def pytest_addoption(parser):
     parser.addoption("--costs", action="store_true", help="tell where the time of the tests goes")
-    parser.addoption("--part", type=_part, metavar="I/N", help="of the files with chosen tests each Nth, from number I on")
+    parser.addoption("--part", type=_part, metavar="I/N", help="of the files with chosen tests each Nth, from I on")
 
 
 def _part(text: str) -> tuple[int, int]:
