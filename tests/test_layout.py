@@ -416,7 +416,7 @@ def test_flank_lines_are_varied_together_with_the_profiles(monkeypatch):
         rows = np.asarray(plan.values)
         tried.update({row: design(dict(zip(plan.names, row))) for row in map(tuple, rows)})
         found = dict.fromkeys(results, np.ones(len(rows))) | dict(zip(plan.names, rows.T))
-        found["ppte"] = np.abs(rows - np.array([10.0, 5.0, -4.0, 3.0])).sum(axis=1)
+        found["ppte"] = np.abs(rows - np.array([10.0, 5.0, -4.0, 3.0, 2.0])).sum(axis=1)
         # teeth meet too early without tip relief on the pinion
         found["effective_contact_ratio"] = np.where(
             rows[:, 0] > 0, 1.0, float(jg.path_of_contact(PAIR).contact_ratio) + 0.2
@@ -427,18 +427,20 @@ def test_flank_lines_are_varied_together_with_the_profiles(monkeypatch):
 
     monkeypatch.setattr(importlib.import_module("jaxgear.layout.profiles"), "sweep", table)
     mesh, lines = SimpleNamespace(pair=PAIR), (jg.LeadCrowning(1.0), jg.LeadSlope(2.0))
-    found = vary_profiles(mesh, TORQUE, lines, [0.0, 10.0], [5.0], slopes=[0.0, -4.0], crownings=[0.0, 3.0])
-    assert len(tried) == 1 + 2 * 2 * 2 and found.amounts == (10.0, 5.0) and found.further == (-4.0, 3.0)
+    further = {"slopes": [0.0, -4.0], "crownings": [0.0, 3.0], "length": [1.0, 2.0]}
+    found = vary_profiles(mesh, TORQUE, lines, [0.0, 10.0], [5.0], **further)
+    assert len(tried) == 1 + 2 * 2 * 2 * 2 and found.amounts == (10.0, 5.0) and found.further == (-4.0, 3.0)
+    assert found.length == 2.0 and float(tried[10.0, 5.0, -4.0, 3.0, 2.0][0].terms[-1].length) == 2.0
     side = kinematics(PAIR, jnp.zeros(()), LINE, "strain").sides[1]
     ends = jnp.array([-0.5, 0.5]) * WIDTH  # at the pitch point, where a tip relief removes nothing
-    for wheel in (tried[10.0, 5.0, -4.0, 3.0][1], lines[1] + found.profiles[1]):
+    for wheel in (tried[10.0, 5.0, -4.0, 3.0, 2.0][1], lines[1] + found.profiles[1]):
         removed = removed_at(side, wheel, jnp.reshape(side.pitch_roll_length, (1,)), ends)
         np.testing.assert_allclose(removed[:, 0], [-1.0 + 2.0 + 3.0, 1.0 - 2.0 + 3.0], atol=1e-9)
     radar = found.radar_table()
     (shock,) = (values for of, values in radar.items() if of.name == "contact_shock" and of.better == "smaller")
-    np.testing.assert_allclose(shock, [0.2] * 5 + [0.0] * 4, atol=1e-12)
+    np.testing.assert_allclose(shock, [0.2] * 9 + [0.0] * 8, atol=1e-12)
     assert "effective_contact_ratio" not in [of.name for of in radar] and len(radar) == 4
-    assert found.radar_variants()[1][1] == "pinion 10, wheel 5 µm, slope -4 µm, crowning +3 µm"
+    assert found.radar_variants()[1][1] == "pinion 10, wheel 5 µm, 2 mm, slope -4 µm, crowning +3 µm"
 
 
 def duty(torques, hours, speed):

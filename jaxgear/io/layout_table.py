@@ -25,6 +25,7 @@ from .value_types import QUALITY_CLASSES, choice, count, either, list_of, positi
 
 _AMOUNTS = list_of(real(Number("um", low=0.0)))
 _FURTHER = list_of(real(Number("um")))
+_LENGTHS = either(positive("mm"), list_of(positive("mm")), "a number or a list of numbers")
 _HOURS = list_of(real(Number("h", low=0.0)))
 _AXES = either(choice("class"), nested(section_of(Misalignment, open=False)), '"class" or a table')
 
@@ -39,7 +40,8 @@ class ProfileSection(FileTable):
         slopes: helix slopes of either sign on top of the flank line of the wheel, over the common face, crossed with
             the amounts; none without it.
         crownings: crownings of either sign, likewise.
-        length: length of a tip relief; that of the zone of double contact (long relief) without it.
+        length: length of the tip reliefs, or several, crossed with the amounts; that of the zone of double contact
+            (long relief) without it.
         torque_factor: torque of the contact analysis, in design torques.
         shafts: whether the contact analysis includes shafts, bearings and housing, with the flank lines of both steps
             and once for every support. Without them the flanks have the further crowning alone, as on shafts whose
@@ -51,7 +53,7 @@ class ProfileSection(FileTable):
     wheel_amounts: list[float] | None = entry(_AMOUNTS)
     slopes: list[float] | None = entry(_FURTHER)
     crownings: list[float] | None = entry(_FURTHER)
-    length: float | None = entry(positive("mm"))
+    length: float | list[float] | None = entry(_LENGTHS)
     torque_factor: float = entry(positive(""), 0.9)
     shafts: bool = entry(switch(), True)
 
@@ -239,6 +241,8 @@ def _profile(layout: LayoutSection, quick: bool) -> ProfileSection | None:
         "slopes": section.slopes or [0.0],
         "crownings": section.crownings or [0.0],
     }
+    if isinstance(section.length, list):
+        amounts["length"] = section.length
     for key, values in amounts.items():
         if len(set(values)) != len(values):
             raise DesignFileError(f"layout.profile.{key}", "must all be different")

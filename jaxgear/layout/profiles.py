@@ -14,7 +14,7 @@ from typing import Any, Literal
 
 import equinox as eqx
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
 from ..conditions.cases import Loads
 from ..contact import Mesh
@@ -44,8 +44,8 @@ _HELICAL = ("corner_contact_length",)
 _SHOCK = 0.01
 AMOUNTS = "pinion_amount", "wheel_amount"
 LINE = "slope", "crowning"  # on top of the flank lines, over the common face
-_VARIABLES = (*AMOUNTS, *LINE)
-_UNITS = dict.fromkeys(_VARIABLES, "um")
+_LENGTH = "length"  # of tip reliefs, on both gears
+_UNITS = {**dict.fromkeys((*AMOUNTS, *LINE), "um"), _LENGTH: "mm"}
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ class ProfileLayout:
     Attributes:
         kind: of the modification.
         table: a row per variant; the first has neither a profile modification nor a further slope or crowning, the
-            others are all combinations, later ones running fastest: pinion, wheel, slope, crowning.
+            others are all combinations, later ones running fastest: pinion, wheel, slope, crowning, length.
         best: number of the variant that was chosen.
         contact_ratio: theoretical one, with the overlap of helical pairs.
         shock: of every variant, contact beyond the theoretical path of contact in base pitches: effective less
@@ -82,6 +82,11 @@ class ProfileLayout:
         """Slope and crowning on top of the flank lines, of the variant that was chosen, over the common face [um]."""
         slope, crowning = (float(self.table.column(name)[self.best]) for name in LINE)
         return slope, crowning
+
+    @property
+    def length(self) -> float | None:
+        """Of the tip relief of the variant that was chosen [mm]; None for profile crownings."""
+        return float(self.table.column(_LENGTH)[self.best]) if self.kind == "tip_relief" else None
 
     @property
     def without_shock(self) -> np.ndarray:
@@ -111,11 +116,13 @@ class ProfileLayout:
         ppte = np.where(self.without_shock, self.table.column("ppte"), np.inf)
         ranked = [int(row) for row in np.argsort(ppte, kind="stable") if row and np.isfinite(ppte[row])]
         rows = list(dict.fromkeys([self.best, *ranked]))[:count]
-        first, second, *lines = (self.table.column(name) for name in _VARIABLES)
+        first, second, *lines = (self.table.column(name) for name in (*AMOUNTS, *LINE))
+        length = self.table.column(_LENGTH) if self.kind == "tip_relief" else np.zeros(1)
         names = []
         for row in rows:
             further = [f"{name} {line[row]:+g} µm" for name, line in zip(LINE, lines) if np.ptp(line)]
-            names.append(", ".join([f"pinion {first[row]:g}, wheel {second[row]:g} µm", *further]))
+            long = [f"{length[row]:.3g} mm"] * bool(np.ptp(length))
+            names.append(", ".join([f"pinion {first[row]:g}, wheel {second[row]:g} µm", *long, *further]))
         return [0, *rows], ["no profile modification", *names]
 
 
@@ -127,7 +134,7 @@ def vary_profiles(
     wheel_amounts: Sequence[float],
     *,
     kind: Kind = "tip_relief",
-    length: Given | None = None,
+    length: float | Sequence[float] | None = None,
     curve: AbstractCurve | None = None,
     slopes: Sequence[float] = (0.0,),
     crownings: Sequence[float] = (0.0,),
@@ -144,7 +151,7 @@ def vary_profiles(
         flank_lines: modifications of pinion and wheel, in every variant.
         pinion_amounts, wheel_amounts: of the modification [um], crossed with each other.
         kind: "tip_relief", for spur gears a long one, or "profile_crowning".
-        length: of the tip relief [mm]; None for the long one.
+        length: of the tip reliefs of both gears [mm], several crossed with the amounts; None for the long one.
         curve: of the tip relief; None for its default.
         slopes, crownings: on top of the flank lines, over the common face and of either sign [um], crossed with the
             amounts.
@@ -154,8 +161,8 @@ def vary_profiles(
         callback: of the progress, as `sweep` takes it.
 
     Raises:
-        ValueError: for another kind, a length or curve of a profile crowning, amounts that are negative or none, and
-            where every variant failed.
+        ValueError: for another kind, a length or curve of a profile crowning, amounts that are negative or none,
+            lengths that are not positive or none, and where every variant failed.
     """
     if kind not in ("tip_relief", "profile_crowning"):
         raise ValueError(f'vary_profiles: kind = {kind!r} must be "tip_relief" or "profile_crowning"')
@@ -172,13 +179,13 @@ def vary_profiles(
         check("vary_profiles", name, np.asarray(amounts, float), "um", low=0.0 if name.endswith("amounts") else None)
         if not len(amounts):
             raise ValueError(f"vary_profiles: {name} must not be empty")
-    length = real(long_relief_length(mesh.pair) if length is None else length)
-    design = _Crossed(flank_lines, _Profile(kind, length, curve), mesh.pair)
-    rows = [(0.0,) * len(_VARIABLES), *itertools.product(*crossed.values())]
+    lengths = _lengths(mesh.pair, kind, length)
+    design = _Crossed(flank_lines, kind, curve, mesh.pair)
+    rows = [(*(0.0,) * len(crossed), *lengths[:1]), *itertools.product(*crossed.values(), *[lengths] * bool(lengths))]
     own = _results(mesh.pair)
     wanted = (*own, *(one for one in results if one not in own))
-    plan = VariantList(_VARIABLES, rows)
-    given: dict[str, Any] = {"mesh": mesh, "torque": torque, "results": wanted, "units": _UNITS}
+    plan, units = _plan(rows)
+    given: dict[str, Any] = {"mesh": mesh, "torque": torque, "results": wanted, "units": units}
     table = sweep(design, plan, output=output, callback=callback, title="profile modifications", **given)
     theoretical = float(path_of_contact(mesh.pair).contact_ratio + mesh.pair.overlap_ratio)
     if mesh.pair.is_spur:
@@ -186,8 +193,8 @@ def vary_profiles(
     else:
         shock = table.column(*_HELICAL) / float(mesh.pair.base_pitch)
     best = _best(table.column("ppte"), shock)
-    first, second, slope, crowning = rows[best]
-    on_pinion, on_wheel = (design.profile(real(amount)) for amount in (first, second))
+    first, second, slope, crowning, *long = rows[best]
+    on_pinion, on_wheel = (design.profile(real(amount), *map(real, long)) for amount in (first, second))
     if slope or crowning:
         on_wheel = FlankLine(real(slope), real(crowning)).on(mesh.pair, "wheel").modification + on_wheel
     return ProfileLayout(kind, table, best, theoretical, shock, (on_pinion, on_wheel))
@@ -216,34 +223,46 @@ def flank_line_contact(
             those of the five cases.
         kind: of the profile modifications that are varied elsewhere, which are zero here.
     """
-    design = _Crossed(flank_lines, _Profile(kind, real(long_relief_length(mesh.pair)), None), mesh.pair)
-    plan = VariantList(_VARIABLES, [(0.0, 0.0, float(slope), 0.0) for slope in deviations])
-    table = sweep(design, plan, mesh=mesh, torque=torque, results=_results(mesh.pair), units=_UNITS)
+    lengths = _lengths(mesh.pair, kind, None)
+    plan, units = _plan([(0.0, 0.0, float(slope), 0.0, *lengths) for slope in deviations])
+    design = _Crossed(flank_lines, kind, None, mesh.pair)
+    table = sweep(design, plan, mesh=mesh, torque=torque, results=_results(mesh.pair), units=units)
     return {name: table.column(name) for name in table.results}
 
 
-class _Profile(eqx.Module):
-    """A profile modification of an amount."""
+def _lengths(pair: GearPair, kind: Kind, given: float | Sequence[float] | None) -> tuple[float, ...]:
+    """Of the tip reliefs that are tried [mm]; none for profile crownings."""
+    if kind == "profile_crowning":
+        return ()
+    lengths = np.atleast_1d(np.asarray(long_relief_length(pair) if given is None else given, float))
+    check("vary_profiles", "length", lengths, "mm", low=0.0, open_low=True)
+    if not len(lengths):
+        raise ValueError("vary_profiles: length must not be empty")
+    return tuple(map(float, lengths))
 
-    kind: Kind = eqx.field(static=True)
-    length: Float[Array, ""]
-    curve: AbstractCurve | None
 
-    def __call__(self, amount) -> AbstractModification:
-        if self.kind == "profile_crowning":
-            return ProfileCrowning(amount)
-        return TipRelief(amount, self.length) if self.curve is None else TipRelief(amount, self.length, self.curve)
+def _plan(rows: Sequence[Sequence[float]]) -> tuple[VariantList, dict[str, str]]:
+    """Variants of as many numbers as a row has, and their units."""
+    units = dict(itertools.islice(_UNITS.items(), len(rows[0])))
+    return VariantList(tuple(units), rows), units
 
 
 class _Crossed(eqx.Module):
     """The design of the sweep; a module, so that one compiled program serves all layouts of a size."""
 
     flank_lines: tuple[AbstractModification, AbstractModification]
-    profile: _Profile
+    kind: Kind = eqx.field(static=True)
+    curve: AbstractCurve | None
     pair: GearPair
 
+    def profile(self, amount, length=None) -> AbstractModification:
+        if self.kind == "profile_crowning":
+            return ProfileCrowning(amount)
+        return TipRelief(amount, length) if self.curve is None else TipRelief(amount, length, self.curve)
+
     def __call__(self, variant):
-        pinion, wheel = (line + self.profile(variant[name]) for line, name in zip(self.flank_lines, AMOUNTS))
+        long = [variant[_LENGTH]] if self.kind == "tip_relief" else []
+        pinion, wheel = (line + self.profile(variant[name], *long) for line, name in zip(self.flank_lines, AMOUNTS))
         further = FlankLine(*(variant[name] for name in LINE)).on(self.pair, "wheel")
         return pinion, wheel + further.modification
 

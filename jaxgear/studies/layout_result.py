@@ -127,7 +127,8 @@ class LayoutResult(AbstractStudyResult):
         words = "tip relief" if profile.kind == "tip_relief" else "profile crowning"
         first, second = profile.amounts
         torque = self.request.profile_torque
-        yield f"step 3 at {torque:g} N m{where}: {words} {first:g} um on the pinion, {second:g} um on the wheel"
+        long = "" if profile.length is None else f", {profile.length:.3g} mm long"
+        yield f"step 3 at {torque:g} N m{where}: {words} {first:g} um on the pinion, {second:g} um on the wheel{long}"
         if any(profile.further):
             slope, crowning = profile.further
             yield f"  on top of the flank lines, over the common face: slope {slope:+g} um, crowning {crowning:+g} um"
@@ -209,6 +210,7 @@ class LayoutResult(AbstractStudyResult):
             "torque_Nm": self.request.profile_torque,
             "variants": len(profile.table),
             "amounts_um": profile.amounts,
+            "length_mm": profile.length,
             "further_slope_and_crowning_um": profile.further,
             "contact_ratio": profile.contact_ratio,
             "unmodified": {name: column[0] for name, column in values.items()},
