@@ -189,7 +189,13 @@ def print_sizes(sizes: dict[str, Size]) -> None:
     for title in ("operations", "StableHLO", "optimized", "trace [CPU s]", "compile [CPU s]", "run [ms]"):
         table.add_column(title, justify="right")
     for name, size in sizes.items():
-        further = [f"{size.lines}", f"{size.optimized}", f"{size.trace:.1f}", f"{size.compile:.1f}", f"{1e3 * size.run:.2f}"]
+        further = [
+            f"{size.lines}",
+            f"{size.optimized}",
+            f"{size.trace:.1f}",
+            f"{size.compile:.1f}",
+            f"{1e3 * size.run:.2f}",
+        ]
         table.add_row(name, f"{size.operations}", *(further if size.lines else [""] * len(further)))
     console.print(table)
 

@@ -33,7 +33,8 @@ from jaxtyping import Array, Float
 
 from ..numerics import AbstractSpring, log, on_both
 from .hertz import ContactGeometry, ContactSide
-from .laws import AbstractLaw, Cut, polynomial
+from .laws import AbstractLaw, Cut
+from .patch import Patch, cut_off
 from .toothload import ToothLoad
 
 Field = Float[Array, "pairs #slices positions"]
@@ -46,12 +47,9 @@ WEDGE_REACH = 0.25
 # Point load at unit distance from the apex of a wedge: its apex solution holds from 1.82 times that distance on (Mellin
 # transform of the wedge, interior angles of 110 to 130 degrees: 1.77 ... 1.88).
 APEX_DISTANCE = 1.82
-# Distances from the corner below this one [mm] count as this one: no contact is as small.
-_SHORTEST = 1e-6
 # between the chamfer of a tip and its top land, as drawings give chamfers without another angle; a rounding begins
 # blunter still
 _CHAMFER_ANGLE = np.pi / 4
-_FULL_TERMS = 12  # of a polynomial that is exact to 1e-8
 
 
 class Edge(eqx.Module):
@@ -174,7 +172,7 @@ class EdgeLaw(AbstractSpring):
         squared = self.width_factor * load
         patch = cut_off(self.edge.distance, squared)
         # Phi's logarithm replaces the half width by half the extent of the patch
-        flank = self.flank.cut_secant(load, self._cut(squared, patch))
+        flank = self.flank.cut_secant(load, self._cut(patch))
         # ln(span) where it is positive, with a smooth onset: ln(1 + span^4) / 4
         span, chamfer = self._span(patch), self.edge.chamfer
         softer = self.edge.wedge * 0.25 * log(1 + span**4)
@@ -186,12 +184,12 @@ class EdgeLaw(AbstractSpring):
     def slope(self, load: Real, secant: Real) -> Real:
         squared = self.width_factor * load
         patch = cut_off(self.edge.distance, squared)
-        change = self.flank.cut_change(load, self._cut(squared, patch))
+        change = self.flank.cut_change(load, self._cut(patch))
         span, chamfer = self._span(patch), self.edge.chamfer
         stiffer = self.edge.wedge * _falling(span)
         if chamfer is not None:
             stiffer = stiffer + chamfer.wedge * _falling(chamfer.share * span)
-        change = change + stiffer * patch.mean_slope * squared * (1 / patch.mean_distance)
+        change = change + stiffer * patch.mean_change
         bending = self.truncation * (patch.bending_slope * squared - patch.bending)
         return ((secant + change) * squared + bending) / squared
 
@@ -199,72 +197,13 @@ class EdgeLaw(AbstractSpring):
         """The law with the centre of contact moved along the flanks towards the pinion tip [mm]."""
         return eqx.tree_at(lambda law: law.edge.distance, self, self.edge.distance - self.edge.side * distance)
 
-    def _cut(self, squared: Real, patch: "Patch") -> Cut:
-        return Cut(squared, patch.squared_extent, patch.widening, 0.5 * self.truncation)
+    def _cut(self, patch: Patch) -> Cut:
+        return Cut(patch, 0.5 * self.truncation)
 
-    def _span(self, patch: "Patch") -> Real:
+    def _span(self, patch: Patch) -> Real:
         return self.edge.reach / APEX_DISTANCE * (1 / patch.mean_distance)
 
 
 def _falling(span: Real) -> Real:
     """d (ln(1 + span^4) / 4) / d ln(distance), as the span falls with the distance."""
     return 1 / (1 + span**4) - 1
-
-
-class Patch(NamedTuple):
-    """What a corner leaves of a contact; slopes are derivatives with respect to a^2.
-
-    Attributes:
-        squared_extent: (L / 2)^2 where the corner cuts the contact off, a^2 elsewhere [mm^2].
-        widening: d ln(squared_extent) / d ln(a^2).
-        bending, bending_slope: a^2 (Phi - ln(2 / l) / 2) without the gap of the corner; zero where nothing is cut off
-            [mm^2].
-        mean_distance, mean_slope: exponential of the mean of ln(distance from the corner) over a semi-ellipse on the
-            patch [mm]: the Hertzian pressure of a full contact, and its bounded counterpart on [0, L].
-    """
-
-    squared_extent: Real
-    widening: Real
-    bending: Real
-    bending_slope: Real
-    mean_distance: Real
-    mean_slope: Real
-
-
-def cut_off(distance: Real, squared: Real) -> Patch:
-    """The patch of a contact whose centre has a given distance from the corner.
-
-    Args:
-        distance: t [mm], negative beyond the corner.
-        squared: a^2 of the full contact [mm^2], positive.
-    """
-    inside = jnp.maximum(distance, 0.0)
-    cut = squared > inside**2
-    root = jnp.sqrt(jnp.where(cut, distance**2 + 3 * squared, jnp.maximum(distance**2 - squared, _SHORTEST**2)))
-    inverse = 1 / root
-    length = jnp.maximum(2 / 3 * (distance + root), _SHORTEST)
-    # without distance^2 / 2 beyond the corner, where the corner gap accounts for it
-    sagitta = 0.5 * length * (0.25 * length - distance) + 0.5 * inside**2
-    # of full contacts alone: of others, its powers overflow single precision, and reverse mode multiplies them by zero
-    relative = jnp.where(cut, 1.0, root * (1 / jnp.maximum(inside, _SHORTEST)))
-    full_mean = inside * polynomial(_FULL_MEAN, relative)
-    return Patch(
-        squared_extent=jnp.where(cut, 0.25 * length**2, squared),
-        widening=jnp.where(cut, 1 - distance * inverse, 1.0),
-        bending=jnp.where(cut, sagitta + length**2 / 16 - 0.25 * squared, 0.0),
-        bending_slope=jnp.where(cut, inverse * (0.375 * length - 0.5 * distance) - 0.25, 0.0),
-        mean_distance=jnp.maximum(jnp.where(cut, _CUT_MEAN * length, full_mean), _SHORTEST),
-        mean_slope=inverse * jnp.where(cut, _CUT_MEAN, -0.5 * polynomial(_FULL_MEAN_SLOPE, relative)),
-    )
-
-
-def _full_mean(relative: np.ndarray) -> np.ndarray:
-    """Mean distance over t of a full contact, at sqrt(t^2 - a^2) / t: g / 2 exp(a^2 / (2 g^2)), g = t + sqrt(...)."""
-    return 0.5 * (1 + relative) * np.exp(0.5 * (1 - relative) / (1 + relative))
-
-
-_CUT_MEAN = 0.25 * float(np.exp(0.5))  # mean distance over L
-# through Chebyshev-Lobatto nodes: exact where the patch reaches the corner, so that nothing jumps there
-_FULL_NODES = 0.5 - 0.5 * np.cos(np.pi * np.arange(_FULL_TERMS) / (_FULL_TERMS - 1))
-_FULL_MEAN = np.linalg.solve(np.vander(_FULL_NODES, increasing=True), _full_mean(_FULL_NODES)).tolist()
-_FULL_MEAN_SLOPE = [power * coefficient for power, coefficient in enumerate(_FULL_MEAN)][1:]

@@ -11,6 +11,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..numerics import AbstractSpring, log
+from .patch import Patch
 
 Field = Float[Array, "pairs #slices positions"]
 Real = Float[Array, "..."]
@@ -20,15 +21,11 @@ class Cut(NamedTuple):
     """A contact that a tip corner cuts off: the logarithm of its approach goes by another half extent than a.
 
     Attributes:
-        squared: a^2 of the full contact [mm^2].
-        squared_extent: square of the half extent that is left [mm^2].
-        widening: d ln(squared_extent) / d ln(a^2).
+        patch: what is left of it.
         logarithm: what a secant loses per ln(a), 2 / (pi E*) [um per N/mm].
     """
 
-    squared: Real
-    squared_extent: Real
-    widening: Real
+    patch: Patch
     logarithm: Real
 
 
@@ -48,11 +45,11 @@ class AbstractPlainLaw(AbstractLaw):
     """A law that does not name its half width: the logarithm of a cut contact comes on top."""
 
     def cut_secant(self, load: Real, cut: Cut) -> Real:
-        return self.secant(load) + 0.5 * cut.logarithm * log(cut.squared / cut.squared_extent)
+        return self.secant(load) + 0.5 * cut.logarithm * log(cut.patch.squared / cut.patch.squared_extent)
 
     def cut_change(self, load: Real, cut: Cut) -> Real:
         secant = self.secant(load)
-        return self.slope(load, secant) - secant + 0.5 * cut.logarithm * (1 - cut.widening)
+        return self.slope(load, secant) - secant + 0.5 * cut.logarithm * (1 - cut.patch.widening)
 
 
 class LinearLaw(AbstractPlainLaw):
@@ -96,10 +93,10 @@ class LogarithmicLaw(AbstractLaw):
         return secant + self._change(load, 1.0)
 
     def cut_secant(self, load: Real, cut: Cut) -> Real:
-        return self._secant(load, cut.squared_extent)
+        return self._secant(load, cut.patch.squared_extent)
 
     def cut_change(self, load: Real, cut: Cut) -> Real:
-        return self._change(load, cut.widening)
+        return self._change(load, cut.patch.widening)
 
     def _secant(self, load: Real, squared_extent: Real) -> Real:
         place = jnp.minimum(2 * self.width_factor * load / self.span - 1, 1.0)
