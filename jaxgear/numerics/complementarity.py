@@ -132,10 +132,11 @@ def _near(problem: ContactProblem) -> tuple[Rows, Curve]:
     start = [jnp.maximum(q, LOAD_FLOOR) for q in start]
     rate = [jnp.clip(k - c, -_STEEPEST * c, _STEEPEST * c) for k, c in zip(slopes_under(shared, start, secant), secant)]
 
-    def with_logarithms(state, rate):
+    def with_logarithms(i, state):  # one loop for both kinds of secants: the elimination is most of it
+        follows = jnp.where(i < _SECANT_STEPS, 0.0, 1.0)
         grown = [jnp.log(jnp.clip(q / q0, _LEAST, _MOST)) for q, q0 in zip(carried_by(state[0]), start)]
-        followed = [c + k * x for c, k, x in zip(secant, rate, grown)]
-        return _newton(problem, state[0], followed, [c + k for c, k in zip(followed, rate)])
+        followed = [c + follows * k * x for c, k, x in zip(secant, rate, grown)]
+        return _newton(problem, state[0], followed, [c + follows * k for c, k in zip(followed, rate)])
 
     def with_laws(_, state):
         load = carried_by(state[0])
@@ -143,16 +144,10 @@ def _near(problem: ContactProblem) -> tuple[Rows, Curve]:
         return _newton(problem, state[0], exact, slopes_under(problem, load, exact))
 
     state = v, jnp.zeros_like(problem.gap[0, 0])
-    if problem.coupling is None:
-        state = jax.lax.fori_loop(0, _SECANT_STEPS, lambda _, s: _newton(problem, s[0], secant, secant), state)
-        state = jax.lax.fori_loop(0, _LOGARITHM_STEPS, lambda _, s: with_logarithms(s, rate), state)
-        return with_laws(0, state)
-
-    def first_constant(i, state):  # one loop for both: the elimination of coupled slices is most of a program
-        return with_logarithms(state, [jnp.where(i < _SECANT_STEPS, 0.0, k) for k in rate])
-
-    state = jax.lax.fori_loop(0, _SECANT_STEPS + _LOGARITHM_STEPS, first_constant, state)
-    return jax.lax.fori_loop(0, _LAW_STEPS_COUPLED, with_laws, state)
+    state = jax.lax.fori_loop(0, _SECANT_STEPS + _LOGARITHM_STEPS, with_logarithms, state)
+    return (
+        with_laws(0, state) if problem.coupling is None else jax.lax.fori_loop(0, _LAW_STEPS_COUPLED, with_laws, state)
+    )
 
 
 def _iterate(
