@@ -17,6 +17,7 @@ from ..numerics import (
     ContactProblem,
     ContactSolution,
     Given,
+    Known,
     concrete,
     minimum,
     nearest,
@@ -117,6 +118,20 @@ def solve_removed(
     return _cycle(
         mesh, operating_point, _solve_removed(for_contact(mesh), operating_point.torque, removed), pinion, wheel
     )
+
+
+def known_at(cycle: MeshCycle, place: Array) -> Known:
+    """The solution of a cycle at the position of this number."""
+    found = (cycle.line_load, cycle.opening, cycle.transmission_error)
+    return Known(*(jax.lax.dynamic_index_in_dim(each, place, axis=-1) for each in found))
+
+
+def solve_known(
+    mesh: Mesh, point: OperatingPoint, known: Known, pinion: AbstractModification, wheel: AbstractModification
+) -> MeshCycle:
+    """`solve` where the solution is known, its approach as transmission error: derivatives, without any iteration."""
+    removed = material_of(mesh, point.torque, pinion, wheel)
+    return _cycle(mesh, point, _solve_removed(for_contact(mesh), point.torque, removed, known), pinion, wheel)
 
 
 def removed_material(
@@ -274,7 +289,8 @@ def contact_of(mesh: Mesh, gap: Load, shift: Float[Array, "pairs #slices positio
         mesh: prepared mesh.
         gap: of the undeformed flanks on rigid, parallel shafts [um].
         shift: of the centre of contact [mm].
-        given: `load` [N], scalar or shape (positions,), or `approach` [um]; `compliance` in place of that of the mesh.
+        given: `load` [N], scalar or shape (positions,), or `approach` [um]; `compliance` in place of that of the mesh;
+            the solution where it is `known`.
     """
     if "load" in given:
         given["start_law"] = mesh.law
@@ -306,6 +322,7 @@ def _of_two_pairs(mesh: Mesh, problem: ContactProblem) -> Contact:
         gap=rows(problem.gap),
         lever=rows(problem.lever),
         coupling=replace(coupling, scale=rows(coupling.scale), alternation=two),
+        known=problem.known and Known(*map(two.rows, problem.known[:2]), problem.known.approach),
     )
     found = _solved(mesh, near)
     load = two.springs(list(found.line_load))
@@ -336,10 +353,17 @@ def _solved(mesh: Mesh, problem: ContactProblem) -> ContactSolution:
     total = jnp.atleast_1d(problem.load / jnp.mean(mesh.slice_width))
     gap = (leaning[:, None] * by_load * total[None])[None]
     upright = replace(coupling, support_modes=None, support=None, crosswise=False)
-    found = solve(replace(problem, gap=stored(problem.gap + problem.levers * gap), coupling=upright))
-    force = sum(lever * q for lever, q in zip(problem.levers, found.line_load))
-    moment = jnp.sum(leaning[:, None] * coupling.weighted(force), axis=0)
-    return replace(found, approach=found.approach + by_load * moment)
+
+    def leant(line_load: Load) -> Curve:
+        force = sum(lever * q for lever, q in zip(problem.levers, line_load))
+        return by_load * jnp.sum(leaning[:, None] * coupling.weighted(force), axis=0)
+
+    known = problem.known
+    if known is not None:
+        known = known._replace(approach=known.approach - leant(known.line_load))
+    gap = stored(problem.gap + problem.levers * gap)
+    found = solve(replace(problem, gap=gap, coupling=upright, known=known))
+    return replace(found, approach=found.approach + leant(found.line_load))
 
 
 def pair_forces(mesh: Mesh, line_load: Load) -> Float[Array, "pairs positions"]:
@@ -397,14 +421,19 @@ def _sliding_gain(mesh: Mesh, shift) -> Float[Array, "2 slices"]:
 
 
 @program
-def _solve_removed(mesh: Mesh, torque: Scalar, removed: RemovedMaterial) -> dict[str, Array]:
+def _solve_removed(
+    mesh: Mesh, torque: Scalar, removed: RemovedMaterial, known: Known | None = None
+) -> dict[str, Array]:
+    """The contact; where it is `known`, its approach is the transmission error."""
     force = _force(mesh, torque)
     removed = jax.tree.map(lambda field: field.astype(force.dtype), removed)
     # stored, or a compiler works the material out again for the few places that the status looks at
     removed = RemovedMaterial(stored(removed.amount), stored(removed.shift), removed.relative_curvature)
     gap = over_slices(mesh.corner_gap) + removed.amount
-    contact = contact_of(mesh, gap, removed.shift, load=force)
-    solution, windup = contact.solution, mesh.hub * force / mesh.pair.face_width
+    windup = mesh.hub * force / mesh.pair.face_width
+    known = known and known._replace(approach=known.approach - windup)
+    contact = contact_of(mesh, gap, removed.shift, load=force, known=known)
+    solution = contact.solution
     unloaded = minimum(contact.gap / over_slices(mesh.lever), axis=(0, 1))
     status = contact_status(mesh, contact, solution.approach, removed)
     if mesh.support_torque is not None:

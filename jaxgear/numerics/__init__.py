@@ -9,6 +9,7 @@ from .complementarity import tangent_stiffness as tangent_stiffness
 from .contact_problem import AbstractSpring as AbstractSpring
 from .contact_problem import ContactProblem as ContactProblem
 from .contact_problem import ContactSolution as ContactSolution
+from .contact_problem import Known as Known
 from .contact_system import opening as opening
 from .conversion import Callback as Callback
 from .conversion import Frozen as Frozen

@@ -6,6 +6,7 @@ as it is open.
 
 from abc import abstractmethod
 from functools import reduce
+from typing import NamedTuple
 
 import equinox as eqx
 import jax
@@ -41,6 +42,18 @@ class AbstractSpring(eqx.Module):
         return self
 
 
+class Known(NamedTuple):
+    """A solution that has been found before: nothing is iterated, and its derivatives are those of the problem.
+
+    Attributes:
+        line_load, opening, approach: as in `ContactSolution`.
+    """
+
+    line_load: Float[Array, "pairs slices positions"]
+    opening: Float[Array, "pairs slices positions"]
+    approach: Float[Array, " positions"]
+
+
 class ContactProblem(eqx.Module):
     """Data of the contact problem.
 
@@ -59,6 +72,7 @@ class ContactProblem(eqx.Module):
             starts from; None for h.
         coupling: how slices are elastically coupled, whose `weight` then is that of the slices over their mean,
             None where all have one; None where only the approach is common.
+        known: its solution; None where that is sought.
 
     Raises:
         ValueError: unless one of load and approach is given.
@@ -73,6 +87,7 @@ class ContactProblem(eqx.Module):
     approach: Float[Array, " positions"] | None = None
     start_law: AbstractSpring | None = None
     coupling: SliceCoupling | None = None
+    known: Known | None = None
 
     def __check_init__(self) -> None:
         if (self.load is None) == (self.approach is None):

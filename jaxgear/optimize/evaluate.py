@@ -18,7 +18,7 @@ from ..conditions import solved
 from ..contact import Mesh, MeshCycle, OperatingPoint, solve
 from ..contact.mesh import at_position
 from ..contact.operating_point import Torque, operating_point_of
-from ..contact.solve import check_mesh, flanks_of
+from ..contact.solve import check_mesh, flanks_of, known_at, solve_known
 from ..metrics import AbstractSettings, Analysis, Quantity, share_settings
 from ..microgeometry import AbstractModification
 from ..numerics.programs import is_eager
@@ -145,7 +145,9 @@ def _of_extremes_jvp(primals: tuple[Any, ...], tangents: tuple[Any, ...]) -> tup
             entries.append(jnp.argmin(below * values))
 
     def at(entry: Array, given: _Given) -> Array:
-        there = given._replace(mesh=at_position(given.mesh, entry % count)).analysis()
+        mesh, known = at_position(given.mesh, entry % count), known_at(analysis.cycle, entry % count)
+        cycle = solve_known(mesh, given.operating_point, known, given.pinion, given.wheel)
+        there = Analysis(cycle, mesh, given.settings)
         return jnp.stack([of.values(there).ravel()[entry // count] for of in wanted])
 
     def decided(given: _Given) -> tuple[Scalar, ...]:
