@@ -1,7 +1,7 @@
 """What the contacts see of a modification around a place on the flank: its mean, slope and curvature."""
 
 from collections.abc import Sequence
-from functools import partial, reduce
+from functools import reduce
 from operator import add
 from typing import Any, NamedTuple
 
@@ -13,7 +13,7 @@ from jaxtyping import Array, Float
 
 from ..geometry import reduced_radius
 from ..microgeometry import AbstractModification, Flank, NoModification, terms
-from ..numerics import by_numbers, over_slices, safe_sqrt
+from ..numerics import over_slices, safe_sqrt
 from .kinematics import Side
 from .mesh import Mesh
 
@@ -184,7 +184,6 @@ def secant_slope(sided_terms: Sequence[Sided], place: Place, moved: Real) -> Rea
     return reduce(add, each) / place.half_width
 
 
-@partial(by_numbers, entrywise=(1,))
 def _moments(
     term: AbstractModification,
     moved: Real,

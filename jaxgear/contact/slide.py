@@ -146,10 +146,14 @@ def _slid(place: Place, sided: Sequence[Sided], sizes: Resolution, pairs: int) -
     if not along:
         flat = jnp.zeros((pairs, 1, sizes.positions), amount.dtype)
         return RemovedMaterial(amount, flat, flat)
-    found = _slide(along, place, contact_nodes(sizes.contact_nodes), sizes.chosen_slide_steps)
-    return RemovedMaterial(amount + found[0], found[1], found[2])
+    steps = sizes.chosen_slide_steps
+    found = _slide(along, place, contact_nodes(sizes.contact_nodes), steps)
+    # a constant stays outside: JAX takes no output of a custom rule that does not depend on what is mapped over
+    shift = found[1] if steps else jnp.zeros_like(found[1])
+    return RemovedMaterial(amount + found[0], shift, found[2])
 
 
+@partial(by_numbers, entrywise=(1,))
 def _slide(sided_terms: Sequence[Sided], place: Place, nodes: tuple[Node, ...], steps: int) -> tuple[Real, Real, Real]:
     """Amount [um], shift [mm] and relative curvature of `RemovedMaterial`, of the shape that the terms have."""
     bulge = 1e3 / place.radius
@@ -170,7 +174,7 @@ def _slide(sided_terms: Sequence[Sided], place: Place, nodes: tuple[Node, ...], 
     if steps:
         slope = bulge * away + seen.slope
         amount = amount - _gain(slope, seen.curvature, moved, tried, bulge, place.lowest, place.highest)
-    return amount, shift, seen.curvature / bulge
+    return amount, shift if steps else amount, seen.curvature / bulge
 
 
 # Slope per bulge below which a place is level [mm]: rounding decides its sign.
@@ -184,7 +188,6 @@ class _Tried(NamedTuple):
     slope: Real
 
 
-@partial(by_numbers, entrywise=range(5))
 def _step(slope: Real, curvature: Real, moved: Real, tried: tuple[_Tried, ...], bulge: Real) -> tuple[Real, Real]:
     """Where the parabola that leads to the least gap has it [mm], and its curvature [um/mm^2].
 
@@ -202,7 +205,6 @@ def _step(slope: Real, curvature: Real, moved: Real, tried: tuple[_Tried, ...], 
     return moved - slope / total, total
 
 
-@partial(by_numbers, entrywise=range(7))
 def _gain(
     slope: Real, curvature: Real, moved: Real, tried: tuple[_Tried, ...], bulge: Real, lowest: Real, highest: Real
 ) -> Real:

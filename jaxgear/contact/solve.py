@@ -311,7 +311,7 @@ def contact_of(mesh: Mesh, gap: Load, shift: Float[Array, "pairs #slices positio
 
 def _of_two_pairs(mesh: Mesh, problem: ContactProblem) -> Contact:
     """The contact where in every slice only the two pairs next to the middle of the path can touch."""
-    coupling = problem.coupling
+    coupling, known = problem.coupling, problem.known
     assert coupling is not None  # `pairs_alternate` asks for it
     two = nearest(jnp.abs(mesh.kinematics.contact_path))
     rows = partial(jax.tree.map, two.rows)
@@ -322,7 +322,7 @@ def _of_two_pairs(mesh: Mesh, problem: ContactProblem) -> Contact:
         gap=rows(problem.gap),
         lever=rows(problem.lever),
         coupling=replace(coupling, scale=rows(coupling.scale), alternation=two),
-        known=problem.known and Known(*map(two.rows, problem.known[:2]), problem.known.approach),
+        known=known and Known(two.rows(known.line_load), two.rows(known.opening), known.approach),
     )
     found = _solved(mesh, near)
     load = two.springs(list(found.line_load))

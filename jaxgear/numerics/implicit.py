@@ -1,5 +1,6 @@
 """Roots with exact derivatives, of one equation and of a few."""
 
+import operator
 from collections.abc import Callable, Collection
 from functools import partial
 from typing import Any, Literal, NamedTuple, ParamSpec, TypeVar, overload
@@ -39,6 +40,11 @@ def jvp_of_given(
     return jax.jvp(of_given, ([primals[i] for i in given],), ([tangents[i] for i in given],))
 
 
+# Numbers by which a chain is differentiated one by one. That leaves out what does not depend on each, and runs in two
+# thirds of the time; of more numbers, all at once makes a smaller program.
+_ONE_BY_ONE = 6
+
+
 def by_numbers(function: Callable[_Given, Result], *, entrywise: Collection[int] = ()) -> Callable[_Given, Result]:
     """The function, with its derivative by every single number of its arguments formed in forward mode.
 
@@ -66,7 +72,14 @@ def by_numbers(function: Callable[_Given, Result], *, entrywise: Collection[int]
             every = jax.tree.unflatten(structure, [directions.get(i) for i in range(len(leaves))])
             return jvp_of_given(lambda given: of_any(*given), primals, every)[1]
 
-        changes = [jax.tree.map(partial(_times, leaves[i]), along({i: jnp.ones_like(values[i])})) for i in numbers]
+        if len(numbers) > _ONE_BY_ONE:
+            basis = jnp.eye(len(numbers), dtype=values[numbers[0]].dtype)
+            every = jax.vmap(lambda row: along({i: row[k] * jnp.ones_like(values[i]) for k, i in enumerate(numbers)}))
+            together = every(basis)
+            derivatives = [jax.tree.map(operator.itemgetter(k), together) for k in range(len(numbers))]
+        else:
+            derivatives = [along({i: jnp.ones_like(values[i])}) for i in numbers]
+        changes = [jax.tree.map(partial(_times, leaves[i]), each) for i, each in zip(numbers, derivatives)]
         if arrays:
             changes.append(along({i: leaves[i] for i in arrays}))
         return wrapped(*primals), jax.tree.map(lambda *parts: sum(parts), *changes)
