@@ -204,7 +204,9 @@ _AT_ONCE = 11
 
 def summed(rows: Float[Array, "..."], axis: int = 0) -> Float[Array, "..."]:
     """The sum over a short axis."""
-    return reduce(add, jnp.unstack(rows, axis=axis))
+    axis %= rows.ndim
+    each = [jax.lax.slice_in_dim(rows, i, i + 1, axis=axis) for i in range(rows.shape[axis])]
+    return jnp.squeeze(reduce(add, each), axis)
 
 
 def onto(
@@ -217,7 +219,7 @@ def onto(
 
     def unrolled(first: Array | int, count: int) -> Array:
         some, of = (jax.lax.dynamic_slice_in_dim(x, first, count, axis) for x, axis in ((modes, 0), (rows, -2)))
-        return reduce(add, [_outer(weight, of[..., s, :]) for s, weight in enumerate(some)])
+        return summed(some.T.reshape(-1, *[1] * (of.ndim - 2), count, 1) * of[None], -2)
 
     parts = [unrolled(turns * _AT_ONCE, left)] if left else []
     if turns:
@@ -230,11 +232,7 @@ def along(
     modes: Float[Array, "slices modes"], modal: Float[Array, "modes ... positions"]
 ) -> Float[Array, "slices ... positions"]:
     """V modal."""
-    return reduce(add, [_outer(weight, value) for weight, value in zip(modes.T, modal)])
-
-
-def _outer(weight: Float[Array, " modes"], row: Float[Array, "... positions"]) -> Float[Array, "modes ... positions"]:
-    return weight.reshape(-1, *[1] * row.ndim) * row[None]
+    return summed(modes.reshape(*modes.shape, *[1] * (modal.ndim - 1)) * modal[None], 1)
 
 
 Bends = Float[Array, "bends positions"]
@@ -346,8 +344,7 @@ def _eliminated(coupling: SliceCoupling, modal: list[Float[Array, "_ springs spr
 
 def _times(first: Float[Array, "... rows pairs positions"], second: Float[Array, "pairs pairs positions"]):
     """Products of small matrices at every position."""
-    wide = second.reshape(-1, *[1] * (first.ndim - 2), *second.shape[1:])
-    return sum(first[..., k, None, :] * wide[k] for k in range(len(second)))
+    return summed(first[..., None, :] * second, -3)
 
 
 def _of_support(
