@@ -344,7 +344,8 @@ def _eliminated(coupling: SliceCoupling, modal: list[Float[Array, "_ springs spr
 
 def _times(first: Float[Array, "... rows pairs positions"], second: Float[Array, "pairs pairs positions"]):
     """Products of small matrices at every position."""
-    return summed(first[..., None, :] * second, -3)
+    wide = second.reshape(*[1] * (first.ndim - 2), *second.shape)
+    return summed(first[..., None, :] * wide, -3)
 
 
 def _of_support(
