@@ -67,6 +67,7 @@ from .microgeometry import Spline as Spline
 from .microgeometry import TabulatedFlank as TabulatedFlank
 from .microgeometry import TabulatedProfile as TabulatedProfile
 from .microgeometry import TipRelief as TipRelief
+from .numerics import enable_cache as enable_cache
 from .numerics import quick_jit as quick_jit
 from .optimize import Constraint as Constraint
 from .optimize import CVaR as CVaR

@@ -45,6 +45,7 @@ from .implicit import implicit_root as implicit_root
 from .implicit import newton as newton
 from .implicit import solve as solve
 from .implicit import with_jacobian as with_jacobian
+from .jax_cache import enable_cache as enable_cache
 from .pareto import decoded as decoded
 from .pareto import halton as halton
 from .pareto import next_generation as next_generation

@@ -1,0 +1,38 @@
+"""JAX's own cache of compiled programs in a private folder, for scripts."""
+
+from pathlib import Path
+
+import jax
+from jax.experimental.compilation_cache import compilation_cache
+
+from .durable import forget_the_oldest, user_folder
+
+_MOST = 256 << 20  # bytes of all that is kept
+
+
+def enable_cache() -> Path | None:
+    """Keep compiled programs for the next start of a script: it then traces them, and compiles nothing.
+
+    JAX's persistent compilation cache in `jaxgear/jax` of the user's cache folder, private and of at most 256 MB, for
+    every program of this process from now on, of jaxgear or not. Call it before the first computation. The commands
+    have a cache of their own.
+
+    Returns:
+        the folder; that which JAX keeps programs in already, where it does; None where there is none: it cannot be
+        made, or others can write to it.
+    """
+    if jax.config.jax_compilation_cache_dir:  # type: ignore[attr-defined]
+        return Path(jax.config.jax_compilation_cache_dir)  # type: ignore[attr-defined]
+    folder = user_folder("jaxgear", "jax")
+    if folder is None:
+        return None
+    try:
+        forget_the_oldest(folder, _MOST)
+    except OSError:
+        return None
+    jax.config.update("jax_compilation_cache_dir", str(folder))
+    # the many small programs of an analysis take as long as the few large ones
+    jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
+    jax.config.update("jax_persistent_cache_min_entry_size_bytes", -1)
+    compilation_cache.reset_cache()  # JAX asks once per process
+    return folder
