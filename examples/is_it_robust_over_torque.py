@@ -44,7 +44,7 @@ def study(fast=False):
     pair, resolution = gear_pair(), jg.Resolution(positions=32 if fast else 64)
     mesh = eqx.filter_jit(jg.prepare)(pair, resolution=resolution)
     amount, full = jg.sizing.relief_amount(pair, TORQUE), jg.long_relief_length(pair)
-    short = jnp.stack([amount, jg.short_relief_length(pair)])
+    short = jnp.stack([amount, jg.sizing.short_relief_length(pair)])
     named = jnp.stack([jnp.zeros(2), short, jnp.stack([amount, full])])
     amounts, lengths = jnp.linspace(4.0, 20.0, 17 if fast else 33), jnp.linspace(3.0, 7.0, 9 if fast else 17)
     grid = jnp.stack(jnp.meshgrid(amounts, lengths, indexing="ij"), axis=-1).reshape(-1, 2)

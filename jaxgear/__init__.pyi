@@ -78,7 +78,6 @@ from .optimize import free_form as free_form
 from .optimize import minimize as minimize
 from .sizing import iso_relief as iso_relief
 from .sizing import long_relief_length as long_relief_length
-from .sizing import short_relief_length as short_relief_length
 from .sweeps import FullFactorial as FullFactorial
 from .sweeps import LatinHypercube as LatinHypercube
 from .sweeps import Sobol as Sobol

@@ -67,7 +67,7 @@ def test_iso_relief_takes_the_whole_double_contact():
     relief = jg.iso_relief(PAIR, 50.0, curve=jg.Linear(), application_factor=1.2)
     assert float(relief.amount) == float(jg.sizing.relief_amount(PAIR, 50.0, 1.2))
     assert float(relief.length) == pytest.approx(5.718, abs=1e-3)
-    assert float(jg.short_relief_length(PAIR)) == pytest.approx(0.5 * 5.718, abs=1e-3)
+    assert float(jg.sizing.short_relief_length(PAIR)) == pytest.approx(0.5 * 5.718, abs=1e-3)
 
 
 def test_run_in_relief():

@@ -13,9 +13,9 @@ _MOST = 256 << 20  # bytes of all that is kept
 def enable_cache() -> Path | None:
     """Keep compiled programs for the next start of a script: it then traces them, and compiles nothing.
 
-    JAX's persistent compilation cache in `jaxgear/jax` of the user's cache folder, private and of at most 256 MB, for
-    every program of this process from now on, of jaxgear or not. Call it before the first computation. The commands
-    have a cache of their own.
+    JAX's persistent compilation cache, in a private folder of the user's cache folder and of at most 256 MB, for every
+    program of this process from now on, whoever made it. Call it before the first computation. The commands have a
+    cache of their own.
 
     Returns:
         the folder; that which JAX keeps programs in already, where it does; None where there is none: it cannot be
@@ -23,7 +23,7 @@ def enable_cache() -> Path | None:
     """
     if jax.config.jax_compilation_cache_dir:  # type: ignore[attr-defined]
         return Path(jax.config.jax_compilation_cache_dir)  # type: ignore[attr-defined]
-    folder = user_folder("jaxgear", "jax")
+    folder = user_folder(__name__.partition(".")[0], "jax")
     if folder is None:
         return None
     try:
