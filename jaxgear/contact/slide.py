@@ -146,16 +146,17 @@ def _slid(place: Place, sided: Sequence[Sided], sizes: Resolution, pairs: int) -
     if not along:
         flat = jnp.zeros((pairs, 1, sizes.positions), amount.dtype)
         return RemovedMaterial(amount, flat, flat)
-    steps = sizes.chosen_slide_steps
-    found = _slide(along, place, contact_nodes(sizes.contact_nodes), steps)
-    # a constant stays outside: JAX takes no output of a custom rule that does not depend on what is mapped over
-    shift = found[1] if steps else jnp.zeros_like(found[1])
-    return RemovedMaterial(amount + found[0], shift, found[2])
+    slid, curvature, *shift = _slide(along, place, contact_nodes(sizes.contact_nodes), sizes.chosen_slide_steps)
+    return RemovedMaterial(amount + slid, shift[0] if shift else jnp.zeros_like(curvature), curvature)
 
 
 @partial(by_numbers, entrywise=(1,))
-def _slide(sided_terms: Sequence[Sided], place: Place, nodes: tuple[Node, ...], steps: int) -> tuple[Real, Real, Real]:
-    """Amount [um], shift [mm] and relative curvature of `RemovedMaterial`, of the shape that the terms have."""
+def _slide(sided_terms: Sequence[Sided], place: Place, nodes: tuple[Node, ...], steps: int) -> tuple[Real, ...]:
+    """Amount [um], relative curvature and, of a contact that slides, shift [mm] of `RemovedMaterial`, of the shape that
+    the terms have.
+
+    No shift without steps: under `jax.vmap` no result of a custom rule may be a constant.
+    """
     bulge = 1e3 / place.radius
     moved = shift = jnp.zeros_like(place.radius)
     tried: tuple[_Tried, ...] = ()
@@ -174,7 +175,7 @@ def _slide(sided_terms: Sequence[Sided], place: Place, nodes: tuple[Node, ...], 
     if steps:
         slope = bulge * away + seen.slope
         amount = amount - _gain(slope, seen.curvature, moved, tried, bulge, place.lowest, place.highest)
-    return amount, shift if steps else amount, seen.curvature / bulge
+    return amount, seen.curvature / bulge, *([shift] if steps else [])
 
 
 # Slope per bulge below which a place is level [mm]: rounding decides its sign.
