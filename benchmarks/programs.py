@@ -9,7 +9,6 @@ import argparse
 import functools
 import json
 import os
-import resource
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -140,12 +139,12 @@ def measure(name: str) -> Size:
     """A program with its compilation."""
     _, sizes, helix_angle = PROGRAMS[name]
     arrays, x = _mesh(sizes, helix_angle)[0], jnp.asarray(_RELIEFS)
-    start = _processor()
+    start = time.process_time()
     trace = traced(name)
     lowered = trace.lower()
-    middle = _processor()
+    middle = time.process_time()
     compiled = lowered.compile()
-    end = _processor()
+    end = time.process_time()
     times = []
     for _ in range(_REPETITIONS):
         began = time.perf_counter()
@@ -159,11 +158,6 @@ def measure(name: str) -> Size:
         end - middle,
         min(times),
     )
-
-
-def _processor() -> float:
-    used = resource.getrusage(resource.RUSAGE_SELF)
-    return used.ru_utime + used.ru_stime
 
 
 def grown(sizes: dict[str, Size], bounds: dict[str, int]) -> list[str]:

@@ -8,10 +8,8 @@ from pathlib import Path
 
 import jax
 
-from ..numerics.durable import KeptFiles, forget_the_oldest, user_folder
+from ..numerics.durable import KeptFiles, program_folder
 from ..numerics.programs import ProgramStore, keep
-
-_MOST = 256 << 20  # bytes of all that is kept
 
 
 def enable_cache() -> Path | None:
@@ -23,14 +21,9 @@ def enable_cache() -> Path | None:
     # by its variable or its configuration; a program that JAX has loaded lacks half of itself when it is written again
     if jax.config.jax_compilation_cache_dir:  # type: ignore[attr-defined]
         return None
-    folder = user_folder("jaxgear", "programs")
-    if folder is None:
-        return None
-    try:
-        forget_the_oldest(folder, _MOST)
-    except OSError:
-        return None
-    keep(ProgramStore(Files(folder)))
+    folder = program_folder("programs")
+    if folder is not None:
+        keep(ProgramStore(Files(folder)))
     return folder
 
 

@@ -134,6 +134,21 @@ def user_folder(*names: str) -> Path | None:
         return None
 
 
+_MOST = 256 << 20  # bytes of all programs of one kind that are kept
+
+
+def program_folder(name: str) -> Path | None:
+    """The folder of this name for compiled programs, where the oldest make room; None where there can be none."""
+    folder = user_folder(__name__.partition(".")[0], name)
+    if folder is None:
+        return None
+    try:
+        forget_the_oldest(folder, _MOST)
+    except OSError:
+        return None
+    return folder
+
+
 def _user_cache() -> Path:
     if os.environ.get("XDG_CACHE_HOME"):
         return Path(os.environ["XDG_CACHE_HOME"])

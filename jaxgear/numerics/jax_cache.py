@@ -5,9 +5,7 @@ from pathlib import Path
 import jax
 from jax.experimental.compilation_cache import compilation_cache
 
-from .durable import forget_the_oldest, user_folder
-
-_MOST = 256 << 20  # bytes of all that is kept
+from .durable import program_folder
 
 
 def enable_cache() -> Path | None:
@@ -23,12 +21,8 @@ def enable_cache() -> Path | None:
     """
     if jax.config.jax_compilation_cache_dir:  # type: ignore[attr-defined]
         return Path(jax.config.jax_compilation_cache_dir)  # type: ignore[attr-defined]
-    folder = user_folder(__name__.partition(".")[0], "jax")
+    folder = program_folder("jax")
     if folder is None:
-        return None
-    try:
-        forget_the_oldest(folder, _MOST)
-    except OSError:
         return None
     jax.config.update("jax_compilation_cache_dir", str(folder))
     # the many small programs of an analysis take as long as the few large ones
