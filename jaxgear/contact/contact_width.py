@@ -24,6 +24,12 @@ Sided = tuple[int, AbstractModification]  # with the number of its gear
 # Least half width over which a modification is averaged, relative to the relative radius: without load a slope would be
 # 0/0. Contacts are as narrow at a thousandth of usual loads.
 _NARROWEST = 1e-3
+# Share of the load at the ends of the path of contact (ISO 6336-2 and ISO/TS 6336-20: unmodified spur gears).
+_SHARE_AT_ENDS = 1 / 3
+_TINY = 1e-6
+# Half of the secant that tells the slope, relative to the half width: over a kink anywhere in the contact it is within
+# 0.05 of the slope of the mean under the pressure.
+_SECANT = 0.8
 
 
 class PlaceSide(NamedTuple):
@@ -143,7 +149,7 @@ def flank_at(side: PlaceSide, moved: Real) -> Flank:
 class Node(NamedTuple):
     """A point across the contact, relative to its half width, and what it weighs in mean, slope and curvature.
 
-    Slope and curvature are those of the parabola that fits best with the weight of the pressure.
+    The curvature is that of the parabola that fits best with the weight of the pressure, the slope that of a secant.
     """
 
     place: float
@@ -157,7 +163,8 @@ def contact_nodes(nodes: int) -> tuple[Node, ...]:
     angle = np.pi * np.arange(1, nodes + 1) / (nodes + 1)
     x, mean = np.cos(angle), np.sin(angle) ** 2 * 2 / (nodes + 1)
     square = x**2 - mean @ x**2
-    slope = mean * x / (mean @ x**2) if nodes > 1 else 0 * x
+    ends = np.abs(np.abs(x) - _SECANT)
+    slope = np.where(np.isclose(ends, ends.min()), 0.5 / x, 0.0) if nodes > 1 else 0 * x
     curvature = 2 * mean * square / (mean @ square**2) if nodes > 2 else 0 * x
     return tuple(Node(*map(float, row)) for row in zip(x, mean, slope, curvature))
 
@@ -177,13 +184,6 @@ def probe(sided_terms: Sequence[Sided], place: Place, moved: Real, nodes: tuple[
     return Probe(mean, slope * inverse, curvature * inverse**2)
 
 
-def secant_slope(sided_terms: Sequence[Sided], place: Place, moved: Real) -> Real:
-    """Slope of the removed material [um/mm] over the middle half of a contact that has moved from its nominal place."""
-    ends, shares = (-0.5, 0.5), [(-1.0, 1.0)]
-    each = [_moments(term, moved, place.sides[side], place.half_width, ends, shares)[0] for side, term in sided_terms]
-    return reduce(add, each) / place.half_width
-
-
 def _moments(
     term: AbstractModification,
     moved: Real,
@@ -201,5 +201,14 @@ def _half_width(mesh: Mesh, torque: Scalar, line_load: Real | None) -> Float[Arr
     """Half width of the contact over which modifications are averaged [mm]: by default of one pair that carries all."""
     if line_load is not None:
         return safe_sqrt(over_slices(mesh.width_factor) * line_load)
-    force = 1e3 * torque / mesh.pair.pinion.base_radius
-    return over_slices(safe_sqrt(mesh.width_factor * force / mesh.pair.face_width))
+    force = 1e3 * torque / mesh.pair.pinion.base_radius * over_slices(_load_share(mesh))
+    return safe_sqrt(over_slices(mesh.width_factor) * force / mesh.pair.face_width)
+
+
+def _load_share(mesh: Mesh) -> Real:
+    """Share of the load that a contact on the path has about, of unmodified flanks: all of it where it is alone, and
+    less towards the ends of the path."""
+    path, contact = mesh.kinematics.contact_path, mesh.path_of_contact
+    inside = jnp.minimum(path - contact.start, contact.end - path)
+    shared = jnp.maximum(contact.end - contact.start - mesh.pair.base_pitch, 0.0)
+    return jnp.clip(_SHARE_AT_ENDS + (1 - _SHARE_AT_ENDS) * inside / (shared + _TINY), _SHARE_AT_ENDS, 1.0)

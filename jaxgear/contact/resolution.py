@@ -9,7 +9,7 @@ import numpy as np
 from ..numerics import Checked, Given, changed, check, count, number, whole
 
 _SLIDING_NODES = 3  # a parabola
-_SLIDE_STEPS = 2
+_SLIDE_STEPS = 16
 # Widths of slices from an end of the face on, how much of that is over the relief, and finest parts of the narrowest
 _END, _OVER_RELIEF, _FINEST = (3, 2, 1, 1), 6, 8
 _MISSED = 0.02  # of the length of a relief, by which slices may end beside where it begins

@@ -35,7 +35,7 @@ from jaxtyping import Array, Float
 from ..compliance import default_compliance
 from ..geometry import GearPair
 from ..microgeometry import AbstractModification, NoModification
-from ..numerics import Checked, Numbers, by_numbers, changed, program, real, result, stored
+from ..numerics import Checked, Numbers, at_root, by_numbers, changed, program, real, result, rising_root
 from .contact_width import (
     Node,
     Place,
@@ -44,7 +44,6 @@ from .contact_width import (
     flank_at,
     place_of,
     probe,
-    secant_slope,
     terms_of,
     varies_along_profile,
 )
@@ -150,69 +149,40 @@ def _slid(place: Place, sided: Sequence[Sided], sizes: Resolution, pairs: int) -
     return RemovedMaterial(amount + slid, shift[0] if shift else jnp.zeros_like(curvature), curvature)
 
 
-@partial(by_numbers, entrywise=(1,))
 def _slide(sided_terms: Sequence[Sided], place: Place, nodes: tuple[Node, ...], steps: int) -> tuple[Real, ...]:
     """Amount [um], relative curvature and, of a contact that slides, shift [mm] of `RemovedMaterial`, of the shape that
-    the terms have.
+    the terms have."""
+    if not steps:
+        amount, curvature, _ = _met(jnp.zeros_like(place.radius), sided_terms, place, nodes, False)
+        return amount, curvature
+    return at_root(_met, partial(_rest, steps=steps), sided_terms, place, nodes)
 
-    No shift without steps: under `jax.vmap` no result of a custom rule may be a constant.
+
+@partial(by_numbers, entrywise=(0, 2))
+def _met(shift: Real, sided_terms: Sequence[Sided], place: Place, nodes: tuple[Node, ...], corners=True):
+    """Amount [um] and relative curvature where a contact has a given shift [mm], and what is missing to its rest [mm].
+
+    The latter is zero where the slope of bulge and removed material together is.
     """
     bulge = 1e3 / place.radius
-    moved = shift = jnp.zeros_like(place.radius)
-    tried: tuple[_Tried, ...] = ()
-    if steps:
-        shift = stored(-secant_slope(sided_terms, place, moved) / bulge)
-        tried = (_Tried(moved, -bulge * (place.beyond + shift)),)
-        moved = _within(place.beyond + shift, place.lowest, place.highest)
-    for _ in range(steps - 1):
-        slope = bulge * (moved - place.beyond) + secant_slope(sided_terms, place, moved)
-        ahead, _ = _step(slope, jnp.zeros_like(slope), moved, tried, bulge)
-        shift = stored(ahead - place.beyond)
-        tried, moved = (*tried, _Tried(moved, slope)), _within(place.beyond + shift, place.lowest, place.highest)
+    moved = _within(place.beyond + shift, place.lowest, place.highest) if corners else shift
     seen = probe(sided_terms, place, moved, nodes)
-    away = moved - place.beyond
-    amount = 0.5 * bulge * (away**2 - place.beyond**2) + seen.mean
-    if steps:
-        slope = bulge * away + seen.slope
-        amount = amount - _gain(slope, seen.curvature, moved, tried, bulge, place.lowest, place.highest)
-    return amount, seen.curvature / bulge, *([shift] if steps else [])
+    amount = 0.5 * bulge * ((moved - place.beyond) ** 2 - place.beyond**2) + seen.mean
+    return amount, seen.curvature / bulge, shift + seen.slope / bulge
 
 
-# Slope per bulge below which a place is level [mm]: rounding decides its sign.
-_LEVEL = {jnp.dtype(jnp.float32): 1e-5, jnp.dtype(jnp.float64): 1e-9}
+def _rest(sided_terms, place, nodes, *, steps: int) -> Real:
+    ends = tuple(node for node in nodes if node.slope)
+
+    def missing(shift):
+        return _met(shift, sided_terms, place, ends)[2]
+
+    shape = jax.eval_shape(lambda: missing(jnp.zeros_like(place.radius))).shape
+    return rising_root(missing, jnp.zeros(shape, place.radius.dtype), most=steps, within=_AT_REST[place.radius.dtype])
 
 
-class _Tried(NamedTuple):
-    """A place where the contact was tried [mm], and the slope of the gap there [um/mm]."""
-
-    moved: Real
-    slope: Real
-
-
-def _step(slope: Real, curvature: Real, moved: Real, tried: tuple[_Tried, ...], bulge: Real) -> tuple[Real, Real]:
-    """Where the parabola that leads to the least gap has it [mm], and its curvature [um/mm^2].
-
-    Where a place that was tried before has a slope of the other sign, the least gap lies between: over a kink the
-    curvature is at least what the slopes of both tell, the latest of such places counting. Level places do not count:
-    the least gap is there.
-    """
-    total = seen = bulge + jnp.maximum(curvature, 0.0)
-    for before in tried:
-        apart = moved - before.moved
-        level = jnp.abs(before.slope) < _LEVEL[slope.dtype] * bulge
-        between = (slope * before.slope < 0) & (apart != 0) & ~level
-        across = (slope - before.slope) / jnp.where(between, apart, 1.0)
-        total = jnp.where(between, jnp.maximum(seen, across), total)
-    return moved - slope / total, total
-
-
-def _gain(
-    slope: Real, curvature: Real, moved: Real, tried: tuple[_Tried, ...], bulge: Real, lowest: Real, highest: Real
-) -> Real:
-    """By how much the gap falls with the step that the parabola seen from a place asks for [um]."""
-    ahead, total = _step(slope, curvature, moved, tried, bulge)
-    step = _within(ahead, lowest, highest) - moved
-    return -step * (slope + 0.5 * step * total)
+# Shift that is left when the search ends [mm].
+_AT_REST = {jnp.dtype(jnp.float32): 1e-6, jnp.dtype(jnp.float64): 1e-13}
 
 
 def _within(x: Real, low: Real, high: Real) -> Real:

@@ -39,10 +39,12 @@ from .fields import result as result
 from .fields import whole as whole
 from .fields import within_limits as within_limits
 from .fits import real_roots as real_roots
+from .implicit import at_root as at_root
 from .implicit import bracketed_root as bracketed_root
 from .implicit import by_numbers as by_numbers
 from .implicit import implicit_root as implicit_root
 from .implicit import newton as newton
+from .implicit import rising_root as rising_root
 from .implicit import solve as solve
 from .implicit import with_jacobian as with_jacobian
 from .jax_cache import enable_cache as enable_cache

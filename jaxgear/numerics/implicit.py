@@ -161,6 +161,86 @@ def _quotient(value, slope):
     return jnp.where(ok, value / jnp.where(ok, slope, jnp.ones_like(slope)), jnp.zeros_like(value))
 
 
+def at_root(function: Callable[..., tuple[Real, ...]], search: Callable[..., Real], *given: Any) -> tuple[Real, ...]:
+    """Results of a function at its root, elementwise; derivatives of any order by the implicit function theorem.
+
+    Args:
+        function: (root, *given) -> (*results, residual); the residual rises with the root.
+        search: (*given) -> root, to rounding; it is never differentiated.
+        given: what both depend on; derivatives flow through it.
+
+    Returns:
+        (*results, root)
+    """
+
+    @eqx.filter_custom_jvp
+    def found(*given):
+        root = search(*given)
+        return *function(root, *given)[:-1], root
+
+    def rule(primals, tangents):
+        root = found(*primals)[-1]
+        values, changes = jvp_of_given(lambda given: function(root, *given), primals, tangents)
+        _, slopes = jax.jvp(lambda root: function(root, *primals), (root,), (jnp.ones_like(root),))
+        moves = -changes[-1] / stored(_rising(slopes[-1]))
+        following = [change + slope * moves for change, slope in zip(changes[:-1], slopes[:-1])]
+        return (*values[:-1], root), (*following, moves)
+
+    found.def_jvp(rule)
+    return found(*given)
+
+
+_LEAST_RISE = 0.1  # per root, below which a residual does not tell how far the root is
+
+
+def _rising(slope: Real) -> Real:
+    return jnp.where(slope > _LEAST_RISE, slope, jnp.ones_like(slope))
+
+
+class _Tried(NamedTuple):
+    """A place and the value of the function there."""
+
+    place: Real
+    value: Real
+
+
+def rising_root(function: Callable[[Real], Real], start: Real, *, most: int, within: float) -> Real:
+    """Where a function rises through zero, elementwise, by regula falsi (Illinois; M. Dowell, P. Jarratt, BIT 11, 1971).
+
+    Args:
+        function: falls without bound to the left and rises to the right, at a rate of about one.
+        start: first guess.
+        most: largest number of evaluations.
+        within: step below which an entry is found.
+    """
+
+    def go_on(state):
+        *_, step, count = state
+        return (count < most) & ((count == 0) | jnp.any(jnp.abs(step) > within))
+
+    def advance(state):
+        x, low, high, step, count = state
+        here = _Tried(x, function(x))
+        falls = here.value < 0
+        known = jnp.where(falls, jnp.isfinite(high.place), jnp.isfinite(low.place))
+        same, other = _either(falls, low, high), _either(falls, high, low)
+        # an end that stays a second time counts with half its value
+        other = other._replace(value=jnp.where(falls == (step > 0), 0.5, 1.0) * other.value)
+        towards = _either(known, other, same)
+        rate = (here.value - towards.value) / (x - towards.place)
+        step = -here.value / jnp.where(rate > _LEAST_RISE, rate, 1.0)  # also where nothing else is known
+        return x + step, _either(falls, here, other), _either(falls, other, here), step, count + 1
+
+    far = jnp.full_like(start, jnp.inf)
+    low, high = _Tried(-far, -far), _Tried(far, far)
+    x, *_ = jax.lax.while_loop(go_on, advance, (start, low, high, jnp.zeros_like(start), 0))
+    return x
+
+
+def _either(first: Bool[Array, "..."], one: _Tried, other: _Tried) -> _Tried:
+    return jax.tree.map(partial(jnp.where, first), one, other)
+
+
 # Newton's method has converged where its next step is this power of the rounding error of the unknowns: what is left
 # after that step is far below.
 _CONVERGED = 2 / 3
