@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from functools import reduce
-from operator import add
+from operator import add, mul
 from typing import Any, NamedTuple
 
 import equinox as eqx
@@ -178,23 +178,21 @@ class Probe(NamedTuple):
 
 
 def probe(sided_terms: Sequence[Sided], place: Place, moved: Real, nodes: tuple[Node, ...]) -> Probe:
-    inverse, (places, *shares) = 1 / place.half_width, zip(*nodes)
-    each = [_moments(term, moved, place.sides[side], place.half_width, places, shares) for side, term in sided_terms]
-    mean, slope, curvature = (reduce(add, parts) for parts in zip(*each))
-    return Probe(mean, slope * inverse, curvature * inverse**2)
+    """What a contact at a place sees; no point of it passes a corner."""
+    points = [within(moved + node.place * place.half_width, place.lowest, place.highest) for node in nodes]
+    removed = [reduce(add, [term(flank_at(place.sides[side], at)) for side, term in sided_terms]) for at in points]
+    mean, curvature = (reduce(add, map(mul, weights, removed)) for weights in zip(*((n.mean, n.curvature) for n in nodes)))
+    ends = [i for i, node in enumerate(nodes) if node.slope]
+    slope = jnp.zeros_like(mean)
+    if ends:
+        first, last = ends
+        slope = (removed[first] - removed[last]) / (points[first] - points[last])
+    return Probe(mean, slope, curvature / place.half_width**2)
 
 
-def _moments(
-    term: AbstractModification,
-    moved: Real,
-    side: PlaceSide,
-    half_width: Real,
-    places: Sequence[float],
-    shares: Sequence[Sequence[float]],
-) -> tuple[Array, ...]:
-    """Sums of the removed material at places relative to the half width, one for each of several shares of them."""
-    removed = [term(flank_at(side, moved + place * half_width)) for place in places]
-    return tuple(reduce(add, [weight * each for weight, each in zip(weights, removed)]) for weights in shares)
+def within(x: Real, low: Real, high: Real) -> Real:
+    # no nested maxima: the derivative of a tie is a division
+    return jnp.where(x < low, low, jnp.where(x > high, high, x))
 
 
 def _half_width(mesh: Mesh, torque: Scalar, line_load: Real | None) -> Float[Array, "pairs #slices positions"]:

@@ -46,6 +46,7 @@ from .contact_width import (
     probe,
     terms_of,
     varies_along_profile,
+    within,
 )
 from .mesh import Mesh
 from .resolution import Resolution
@@ -165,7 +166,7 @@ def _met(shift: Real, sided_terms: Sequence[Sided], place: Place, nodes: tuple[N
     The latter is zero where the slope of bulge and removed material together is.
     """
     bulge = 1e3 / place.radius
-    moved = _within(place.beyond + shift, place.lowest, place.highest) if corners else shift
+    moved = within(place.beyond + shift, place.lowest, place.highest) if corners else shift
     seen = probe(sided_terms, place, moved, nodes)
     amount = 0.5 * bulge * ((moved - place.beyond) ** 2 - place.beyond**2) + seen.mean
     return amount, seen.curvature / bulge, shift + seen.slope / bulge
@@ -182,12 +183,7 @@ def _rest(sided_terms, place, nodes, *, steps: int) -> Real:
 
 
 # Shift that is left when the search ends [mm].
-_AT_REST = {jnp.dtype(jnp.float32): 1e-6, jnp.dtype(jnp.float64): 1e-13}
-
-
-def _within(x: Real, low: Real, high: Real) -> Real:
-    # no nested maxima: the derivative of a tie is a division
-    return jnp.where(x < low, low, jnp.where(x > high, high, x))
+_AT_REST = {jnp.dtype(jnp.float32): 1e-6, jnp.dtype(jnp.float64): 1e-9}
 
 
 # Largest relative violation of the contact conditions at which loads still tell how wide the contacts are.

@@ -220,7 +220,7 @@ def rising_root(function: Callable[[Real], Real], start: Real, *, most: int, wit
 
     def advance(state):
         x, low, high, step, count = state
-        here = _Tried(x, function(x))
+        here = _Tried(x, stored(function(x)))
         falls = here.value < 0
         known = jnp.where(falls, jnp.isfinite(high.place), jnp.isfinite(low.place))
         same, other = _either(falls, low, high), _either(falls, high, low)
@@ -228,7 +228,7 @@ def rising_root(function: Callable[[Real], Real], start: Real, *, most: int, wit
         other = other._replace(value=jnp.where(falls == (step > 0), 0.5, 1.0) * other.value)
         towards = _either(known, other, same)
         rate = (here.value - towards.value) / (x - towards.place)
-        step = -here.value / jnp.where(rate > _LEAST_RISE, rate, 1.0)  # also where nothing else is known
+        step = -here.value / jnp.where(jnp.isfinite(rate), jnp.maximum(rate, _LEAST_RISE), 1.0)
         return x + step, _either(falls, here, other), _either(falls, other, here), step, count + 1
 
     far = jnp.full_like(start, jnp.inf)
