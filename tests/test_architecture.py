@@ -172,6 +172,7 @@ OF_ANY_TYPE = {
     "dynamics/settings.py Dynamics.oscillator_and_mesh": "likewise",
     "dynamics/settings.py Dynamics.runs_of": "designs are a tree of arrays of any kind, as what is kept of them",
     "dynamics/settling.py steady_state": "takes two classes of the file that imports it",
+    "numerics/implicit.py at_root": "passes on what a function and its search are given",
     "io/design_file.py DesignFile.needed": "a further table has a class of its own",
     "io/design_file.py DesignFile.spectrum": "takes any table with torques and weights",
     "io/gears.py with_quality": "takes any table with quality classes",

@@ -95,7 +95,7 @@ def test_where_the_first_solution_failed_nothing_converges(mesh, default):
     given = jnp.full((2, 1, 16), 50.0), jnp.asarray(residual)
     met = []
     found = loaded_material(mesh, *task, lambda removed: (met.append(removed), given)[1])
-    # what the first solution meets is over the width of one pair that carries all
+    # what the first solution meets is over the width under the loads of unmodified flanks
     np.testing.assert_allclose(met[0].amount, slid_material(default, *task).amount, rtol=1e-12, atol=1e-12)
     assert isinstance(found, RemovedMaterial)
     np.testing.assert_array_equal(np.isnan(found.amount).all(axis=(0, 1)), np.isin(np.arange(16), (3, 5)))

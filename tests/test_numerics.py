@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from jaxgear.numerics import (
+    at_root,
     bracketed_root,
     by_numbers,
     check,
@@ -14,6 +15,7 @@ from jaxgear.numerics import (
     optional_real,
     real,
     real_roots,
+    rising_root,
     safe_divide,
     safe_log,
     safe_power,
@@ -69,6 +71,40 @@ def test_roots_at_the_ends_of_the_bracket_keep_their_value():
 
 
 roots_of = jax.jit(real_roots)
+
+
+def test_results_at_a_root_and_two_derivatives():
+    """x + x^3 = a: of x^2 there, in both modes."""
+
+    def squared(a):
+        def function(x, a):
+            return x**2, x + x**3 - a
+
+        def search(a):
+            return rising_root(lambda x: function(x, a)[-1], jnp.zeros_like(a), most=30, within=1e-12)
+
+        return at_root(function, search, a)[0]
+
+    x = np.asarray([-0.7, 0.4, 1.3])
+    a, rise = x + x**3, 1 + 3 * x**2
+    slope = 2 * x / rise
+    np.testing.assert_allclose(squared(a), x**2, rtol=1e-13)
+    np.testing.assert_allclose(jax.vmap(jax.grad(squared))(a), slope, rtol=1e-12)
+    np.testing.assert_allclose(jax.jvp(squared, (a,), (np.ones(3),))[1], slope, rtol=1e-12)
+    second = (2 * rise - 2 * x * 6 * x) / rise**3
+    np.testing.assert_allclose(jax.vmap(jax.grad(jax.grad(squared)))(a), second, rtol=1e-11)
+
+
+def test_secants_find_a_root_behind_kinks_and_dents():
+    """Where the function falls for a while, and at kinks of 1 to 100 as steep."""
+    steep = np.asarray([1.0, 10.0, 100.0, 100.0])
+    offset = np.asarray([0.3, -0.2, 0.4, -5.0])
+
+    def function(x):
+        return x - offset + steep * jnp.maximum(x - 0.05, 0.0) + jnp.sin(3 * x)
+
+    root = rising_root(function, jnp.zeros(4), most=30, within=1e-9)
+    np.testing.assert_allclose(function(root), 0.0, atol=1e-9)
 
 
 def test_by_numbers_changes_how_derivatives_are_formed_and_not_what_they_are():

@@ -81,17 +81,21 @@ def prepare(positions: int = 64, slices: int = 1, *, coupled: bool = False, heli
 
 def plain(mesh) -> Problem:
     """The numbers of a prepared mesh with the default compliance model, under the benchmark's torque."""
+    import jax.numpy as jnp
+
     from jaxgear.compliance.hertz import contact_geometry
     from jaxgear.compliance.toothload import tooth_load
+    from jaxgear.contact.contact_width import place_of
     from jaxgear.geometry import outline
 
     gears = mesh.pair.pinion, mesh.pair.wheel
     force = 1e3 * TORQUE / float(gears[0].base_radius)
-    half_width = np.sqrt(np.asarray(mesh.width_factor) * force / float(mesh.pair.face_width))
+    place = place_of(mesh, jnp.asarray(TORQUE))
+    half_width, lowest, highest = (np.asarray(each)[:, 0] for each in (place.half_width, place.lowest, place.highest))
     # Chebyshev nodes of the second kind integrate with the semi-elliptic pressure as their weight
     count = mesh.resolution.contact_nodes
     angle = np.pi * np.arange(1, count + 1) / (count + 1)
-    offset = np.cos(angle)[:, None, None] * half_width
+    offset = np.clip(np.cos(angle)[:, None, None] * half_width, lowest, highest)
     loads = [tooth_load(outline(side.gear), side.contact_roll_length) for side in mesh.sides]
     rolls = [np.asarray(load.roll_length) for load in loads]
     beyond = [

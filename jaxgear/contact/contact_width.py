@@ -1,8 +1,8 @@
 """What the contacts see of a modification around a place on the flank: its mean, slope and curvature."""
 
 from collections.abc import Sequence
-from functools import reduce
-from operator import add, mul
+from functools import partial, reduce
+from operator import add
 from typing import Any, NamedTuple
 
 import equinox as eqx
@@ -11,9 +11,9 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from ..geometry import reduced_radius
+from ..geometry import GearPair, reduced_radius
 from ..microgeometry import AbstractModification, Flank, NoModification, terms
-from ..numerics import over_slices, safe_sqrt
+from ..numerics import by_numbers, over_slices, safe_sqrt, stored
 from .kinematics import Side
 from .mesh import Mesh
 
@@ -24,11 +24,11 @@ Sided = tuple[int, AbstractModification]  # with the number of its gear
 # Least half width over which a modification is averaged, relative to the relative radius: without load a slope would be
 # 0/0. Contacts are as narrow at a thousandth of usual loads.
 _NARROWEST = 1e-3
-# Share of the load at the ends of the path of contact (ISO 6336-2 and ISO/TS 6336-20: unmodified spur gears).
+# Share of the load at the ends of the path of contact, of unmodified spur gears (ISO/TS 6336-20, accurate gears).
 _SHARE_AT_ENDS = 1 / 3
-_TINY = 1e-6
+_LEAST_SHARED = 1e-6  # length of the path on which pairs share the load [mm], of contact ratios of one and below
 # Half of the secant that tells the slope, relative to the half width: over a kink anywhere in the contact it is within
-# 0.05 of the slope of the mean under the pressure.
+# 0.05 of the slope of the mean under the pressure, relative to the change of slope at the kink.
 _SECANT = 0.8
 
 
@@ -36,10 +36,10 @@ class PlaceSide(NamedTuple):
     """One gear's side of the contacts: numbers of shape (1, 1, 1), roll length of (pairs, 1 or slices, positions).
 
     Attributes:
-        direction: +1 where moving towards the pinion tip makes the roll length grow, else -1.
+        rate: of the roll length over the way along the flank towards the pinion tip; negative on the wheel.
     """
 
-    direction: float
+    rate: Real
     roll_length: Real
     base_radius: Real
     tip_roll_length: Real
@@ -97,9 +97,11 @@ def _side(mesh: Mesh, side: Side, direction: float) -> PlaceSide:
     def number(value: Array) -> Array:
         return jnp.reshape(value, (1, 1, 1))
 
+    roll_length = over_slices(side.contact_roll_length)
     return PlaceSide(
-        direction,
-        over_slices(side.contact_roll_length),
+        # arc length of an involute: ds = rho / r_b d rho
+        stored(direction * side.base_radius / roll_length),
+        roll_length,
         number(side.base_radius),
         number(side.tip_roll_length),
         number(side.start_roll_length),
@@ -134,8 +136,7 @@ def varies_along_profile(sided: Sided, place: Place) -> bool:
 
 def flank_at(side: PlaceSide, moved: Real) -> Flank:
     """Points of one gear's flank at a distance from the nominal contact, towards the pinion tip [mm]."""
-    # arc length of an involute: ds = rho / r_b d rho
-    roll_length = side.roll_length + side.direction * moved * (side.base_radius / side.roll_length)
+    roll_length = side.roll_length + moved * side.rate
     return Flank(
         roll_length=jnp.where(roll_length > 0, roll_length, 0.0),
         tip_roll_length=side.tip_roll_length,
@@ -147,15 +148,18 @@ def flank_at(side: PlaceSide, moved: Real) -> Flank:
 
 
 class Node(NamedTuple):
-    """A point across the contact, relative to its half width, and what it weighs in mean, slope and curvature.
+    """A point across the contact, relative to its half width, and what it weighs in mean and curvature.
 
-    The curvature is that of the parabola that fits best with the weight of the pressure, the slope that of a secant.
+    The curvature is that of the parabola that fits best with the weight of the pressure.
+
+    Attributes:
+        ends: whether the secant that tells the slope ends here.
     """
 
     place: float
     mean: float
-    slope: float
     curvature: float
+    ends: bool
 
 
 def contact_nodes(nodes: int) -> tuple[Node, ...]:
@@ -163,10 +167,10 @@ def contact_nodes(nodes: int) -> tuple[Node, ...]:
     angle = np.pi * np.arange(1, nodes + 1) / (nodes + 1)
     x, mean = np.cos(angle), np.sin(angle) ** 2 * 2 / (nodes + 1)
     square = x**2 - mean @ x**2
-    ends = np.abs(np.abs(x) - _SECANT)
-    slope = np.where(np.isclose(ends, ends.min()), 0.5 / x, 0.0) if nodes > 1 else 0 * x
     curvature = 2 * mean * square / (mean @ square**2) if nodes > 2 else 0 * x
-    return tuple(Node(*map(float, row)) for row in zip(x, mean, slope, curvature))
+    off = np.abs(np.abs(x) - _SECANT)
+    ends = np.isclose(off, off.min()) & (x != 0) & (nodes > 1)
+    return tuple(Node(float(p), float(m), float(c), bool(e)) for p, m, c, e in zip(x, mean, curvature, ends))
 
 
 class Probe(NamedTuple):
@@ -178,16 +182,27 @@ class Probe(NamedTuple):
 
 
 def probe(sided_terms: Sequence[Sided], place: Place, moved: Real, nodes: tuple[Node, ...]) -> Probe:
-    """What a contact at a place sees; no point of it passes a corner."""
-    points = [within(moved + node.place * place.half_width, place.lowest, place.highest) for node in nodes]
-    removed = [reduce(add, [term(flank_at(place.sides[side], at)) for side, term in sided_terms]) for at in points]
-    mean, curvature = (reduce(add, map(mul, weights, removed)) for weights in zip(*((n.mean, n.curvature) for n in nodes)))
-    ends = [i for i, node in enumerate(nodes) if node.slope]
-    slope = jnp.zeros_like(mean)
-    if ends:
-        first, last = ends
-        slope = (removed[first] - removed[last]) / (points[first] - points[last])
-    return Probe(mean, slope, curvature / place.half_width**2)
+    """What a contact sees that has moved from its nominal place [mm]; no point of it passes a corner."""
+    span = place.half_width, place.lowest, place.highest
+    seen = [_seen(term, moved, place.sides[side], span, nodes) for side, term in sided_terms]
+    return jax.tree.map(lambda *parts: reduce(add, parts), *seen)
+
+
+@partial(by_numbers, entrywise=(1, 2, 3))
+def _seen(
+    term: AbstractModification, moved: Real, side: PlaceSide, span: tuple[Real, Real, Real], nodes: tuple[Node, ...]
+) -> Probe:
+    half_width, lowest, highest = span
+    points = [within(moved + node.place * half_width, lowest, highest) for node in nodes]
+    removed = [term(flank_at(side, at)) for at in points]
+    mean = reduce(add, [node.mean * each for node, each in zip(nodes, removed)])
+    curvature = reduce(add, [node.curvature * each for node, each in zip(nodes, removed)])
+    ends = [(at, each) for node, at, each in zip(nodes, points, removed) if node.ends]
+    return Probe(mean, _secant(*ends) if ends else jnp.zeros_like(mean), curvature / half_width**2)
+
+
+def _secant(first: tuple[Real, Real], last: tuple[Real, Real]) -> Real:
+    return (first[1] - last[1]) / (first[0] - last[0])
 
 
 def within(x: Real, low: Real, high: Real) -> Real:
@@ -196,17 +211,24 @@ def within(x: Real, low: Real, high: Real) -> Real:
 
 
 def _half_width(mesh: Mesh, torque: Scalar, line_load: Real | None) -> Float[Array, "pairs #slices positions"]:
-    """Half width of the contact over which modifications are averaged [mm]: by default of one pair that carries all."""
-    if line_load is not None:
-        return safe_sqrt(over_slices(mesh.width_factor) * line_load)
-    force = 1e3 * torque / mesh.pair.pinion.base_radius * over_slices(_load_share(mesh))
-    return safe_sqrt(over_slices(mesh.width_factor) * force / mesh.pair.face_width)
+    """Half width of the contact over which modifications are averaged [mm]."""
+    load = usual_load(mesh, torque) if line_load is None else line_load
+    return safe_sqrt(over_slices(mesh.width_factor) * load)
 
 
-def _load_share(mesh: Mesh) -> Real:
-    """Share of the load that a contact on the path has about, of unmodified flanks: all of it where it is alone, and
-    less towards the ends of the path."""
+def usual_load(mesh: Mesh, torque: Scalar) -> Float[Array, "pairs #slices positions"]:
+    """Line load of contacts of unmodified flanks, about [N/mm].
+
+    It is the full one where a pair is alone and falls to the ends of the path of contact from there, without the jump
+    where a second pair comes into contact.
+    """
     path, contact = mesh.kinematics.contact_path, mesh.path_of_contact
     inside = jnp.minimum(path - contact.start, contact.end - path)
-    shared = jnp.maximum(contact.end - contact.start - mesh.pair.base_pitch, 0.0)
-    return jnp.clip(_SHARE_AT_ENDS + (1 - _SHARE_AT_ENDS) * inside / (shared + _TINY), _SHARE_AT_ENDS, 1.0)
+    shared = jnp.maximum(contact.end - contact.start - mesh.pair.base_pitch, _LEAST_SHARED)
+    share = jnp.clip(_SHARE_AT_ENDS + (1 - _SHARE_AT_ENDS) * inside / shared, _SHARE_AT_ENDS, 1.0)
+    return over_slices(share) * full_load(mesh.pair, torque)
+
+
+def full_load(pair: GearPair, torque: Scalar) -> Scalar:
+    """Line load of one pair that carries all of it [N/mm]."""
+    return 1e3 * torque / (pair.pinion.base_radius * pair.face_width)

@@ -9,7 +9,7 @@ import numpy as np
 from ..numerics import Checked, Given, changed, check, count, number, whole
 
 _SLIDING_NODES = 3  # a parabola
-_SLIDE_STEPS = 16
+_SLIDE_STEPS = 20
 # Widths of slices from an end of the face on, how much of that is over the relief, and finest parts of the narrowest
 _END, _OVER_RELIEF, _FINEST = (3, 2, 1, 1), 6, 8
 _MISSED = 0.02  # of the length of a relief, by which slices may end beside where it begins
@@ -29,9 +29,9 @@ class Resolution(Checked):
             to 3.
         contact_nodes: points across the contact width at which modifications are averaged; 1 takes the nominal contact
             point alone.
-        slide_steps: steps of the contact shift on the slope of a modification; 0 keeps the contact at its nominal
-            place. None for 2, and for 0 with fewer than 3 points across the contact, which do not resolve slope and
-            curvature.
+        slide_steps: most steps of the search for the place where a contact rests on the slope of a modification; 0
+            keeps it at its nominal place. None for 20, of which reliefs take four or five, and for 0 with fewer than 3
+            points across the contact, which do not resolve slope and curvature.
         coupled_slices: whether slices are elastically coupled, as those of a real face are; without it each slice
             deflects on its own, and the peak of line loads that vary over the face is 10 to 40 % too small. No effect
             on one slice.

@@ -144,9 +144,9 @@ def removed_material(
     """Material removed from both flanks, as the contacts meet it.
 
     A small gap that varies across the contact acts with its mean, weighted by the Hertzian pressure; the contact slides
-    down the slope of the flanks to where bulge and mean together are least (see `slide`). The half width is
-    that of one pair that carries the full load; with a compliance that averages over the loaded width, as that by
-    finite elements, it is that of every contact's own load, from a first solution with the former.
+    down the slope of the flanks to where bulge and mean together are least, and is as wide as the load of unmodified
+    flanks makes it; with a compliance that averages over the loaded width, as that by finite elements, it is as wide as
+    its own load from a first solution does (see `slide`).
     It grows with the torque, so that on flanks beyond what the first order
     holds for the transmission error can fall while the torque grows. Measured on a 19/48 pair of module 3 with random
     tables, from 1 to 200 N m in 23 steps: 1 to 4 in 100 000 steps fall, by 0.02 um at most, where the tables jump by

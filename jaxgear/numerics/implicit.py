@@ -161,6 +161,10 @@ def _quotient(value, slope):
     return jnp.where(ok, value / jnp.where(ok, slope, jnp.ones_like(slope)), jnp.zeros_like(value))
 
 
+# Rise of a residual per root below which nothing tells how the root moves: two roots meet there.
+_LEAST_RISE = 1e-3
+
+
 def at_root(function: Callable[..., tuple[Real, ...]], search: Callable[..., Real], *given: Any) -> tuple[Real, ...]:
     """Results of a function at its root, elementwise; derivatives of any order by the implicit function theorem.
 
@@ -182,7 +186,8 @@ def at_root(function: Callable[..., tuple[Real, ...]], search: Callable[..., Rea
         root = found(*primals)[-1]
         values, changes = jvp_of_given(lambda given: function(root, *given), primals, tangents)
         _, slopes = jax.jvp(lambda root: function(root, *primals), (root,), (jnp.ones_like(root),))
-        moves = -changes[-1] / stored(_rising(slopes[-1]))
+        rise = jnp.where(slopes[-1] > _LEAST_RISE, slopes[-1], jnp.ones_like(root))
+        moves = -changes[-1] / stored(rise)
         following = [change + slope * moves for change, slope in zip(changes[:-1], slopes[:-1])]
         return (*values[:-1], root), (*following, moves)
 
@@ -190,22 +195,21 @@ def at_root(function: Callable[..., tuple[Real, ...]], search: Callable[..., Rea
     return found(*given)
 
 
-_LEAST_RISE = 0.1  # per root, below which a residual does not tell how far the root is
-
-
-def _rising(slope: Real) -> Real:
-    return jnp.where(slope > _LEAST_RISE, slope, jnp.ones_like(slope))
+_FARTHEST = 10.0  # step per value of the function
 
 
 class _Tried(NamedTuple):
-    """A place and the value of the function there."""
+    """A place and the value of a function there."""
 
     place: Real
     value: Real
 
 
 def rising_root(function: Callable[[Real], Real], start: Real, *, most: int, within: float) -> Real:
-    """Where a function rises through zero, elementwise, by regula falsi (Illinois; M. Dowell, P. Jarratt, BIT 11, 1971).
+    """Where a function rises through zero, elementwise; secants lead there.
+
+    Between values of either sign the end that stays a second time counts with half its value (Illinois; M. Dowell,
+    P. Jarratt, BIT 11, 1971).
 
     Args:
         function: falls without bound to the left and rises to the right, at a rate of about one.
@@ -222,19 +226,18 @@ def rising_root(function: Callable[[Real], Real], start: Real, *, most: int, wit
         x, low, high, step, count = state
         here = _Tried(x, stored(function(x)))
         falls = here.value < 0
-        known = jnp.where(falls, jnp.isfinite(high.place), jnp.isfinite(low.place))
         same, other = _either(falls, low, high), _either(falls, high, low)
-        # an end that stays a second time counts with half its value
         other = other._replace(value=jnp.where(falls == (step > 0), 0.5, 1.0) * other.value)
-        towards = _either(known, other, same)
-        rate = (here.value - towards.value) / (x - towards.place)
-        step = -here.value / jnp.where(jnp.isfinite(rate), jnp.maximum(rate, _LEAST_RISE), 1.0)
+        towards = _either(jnp.isfinite(other.place), other, same)
+        apart = x - towards.place
+        known = jnp.isfinite(apart) & (apart != 0)
+        rate = jnp.where(known, here.value - towards.value, 1.0) / jnp.where(known, apart, 1.0)
+        step = -here.value / jnp.maximum(rate, 1 / _FARTHEST)
         return x + step, _either(falls, here, other), _either(falls, other, here), step, count + 1
 
     far = jnp.full_like(start, jnp.inf)
-    low, high = _Tried(-far, -far), _Tried(far, far)
-    x, *_ = jax.lax.while_loop(go_on, advance, (start, low, high, jnp.zeros_like(start), 0))
-    return x
+    state = start, _Tried(-far, -far), _Tried(far, far), jnp.zeros_like(start), 0
+    return jax.lax.while_loop(go_on, advance, state)[0]
 
 
 def _either(first: Bool[Array, "..."], one: _Tried, other: _Tried) -> _Tried:

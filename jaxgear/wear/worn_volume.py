@@ -41,7 +41,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ..contact import Mesh, MeshCycle
-from ..contact.contact_width import contact_nodes, place_of
+from ..contact.contact_width import contact_nodes, full_load, place_of
 from ..contact.kinematics import contacts
 from ..geometry import PathOfContact
 from ..numerics import Given, Numbers, check, over_slices, program, real, safe_divide, safe_sqrt
@@ -135,7 +135,8 @@ def deposit(mesh: Mesh, torque: Scalar, points: int) -> Deposit:
 
     at, bases = contacts(mesh.pair, contact, along(_MIDDLES)), [side.base_radius for side in mesh.sides]
     rolls = at.pinion_roll_length, at.wheel_roll_length
-    knots, place = grid(mesh, points), place_of(mesh, torque)
+    full = full_load(mesh.pair, torque)
+    knots, place = grid(mesh, points), place_of(mesh, torque, full)
     return Deposit(
         roll_length=knots,
         arc=jnp.stack([arcs(of, base) for of, base in zip(knots, bases)]),
@@ -146,7 +147,7 @@ def deposit(mesh: Mesh, torque: Scalar, points: int) -> Deposit:
         beyond=place.beyond,
         lowest=place.lowest,
         highest=place.highest,
-        full_load=1e3 * torque / (mesh.pair.pinion.base_radius * mesh.pair.face_width),
+        full_load=full,
         inclination=jnp.cos(mesh.pair.pinion.base_helix_angle),
         nodes=1 if mesh.resolution.contact_nodes == 1 else _ACROSS,
     )
