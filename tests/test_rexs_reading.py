@@ -536,7 +536,7 @@ def test_flanks_that_differ_have_to_be_chosen(written):
         0
     ]
     written.path.write_text(written.text.replace(relation, ""))  # the right flank has no tip relief now
-    with pytest.raises(DesignFileError, match=r"flank 7: is modified otherwise than flank 8, choose left or right"):
+    with pytest.raises(DesignFileError, match=r"flank 7: has other modifications than flank 8, choose left or right"):
         read_rexs(written.path)
     roll = PINION.tip
     said = attribute("loaded_tooth_flank", "right", "none")

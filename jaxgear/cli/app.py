@@ -352,7 +352,7 @@ def _code_of(arguments: Sequence[str] | None) -> int:
     except BrokenPipeError:
         streams.forget_output()
         return OK
-    except SystemExit as end:  # of typer, where nobody reads its help to the end
+    except SystemExit as end:  # raised by typer where the reader of its help closes the pipe early
         if isinstance(end.__context__, BrokenPipeError):
             return OK
         raise

@@ -35,7 +35,7 @@ class Files(KeptFiles):
 
 
 def _surroundings() -> bytes:
-    """What a program depends on besides what it is made of: code, compiler, its settings, and the processor."""
+    """Digest of what every compiled program depends on: package code, versions, settings, backend and processor."""
     found = hashlib.sha256()
     package = Path(__file__).parent.parent
     for file in sorted(package.rglob("*.py")):

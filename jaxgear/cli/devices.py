@@ -11,7 +11,7 @@ def use_all_cores() -> None:
     """Makes every usable core a device of JAX, unless the user has said how many devices there are.
 
     One device leaves most cores idle: the arrays of a contact solution are too small to be split among them. Two are
-    the least, because a program for several devices rounds otherwise than one for a single device.
+    the least, because a program for several devices rounds differently from one for a single device.
     """
     if os.environ.get("JAX_NUM_CPU_DEVICES") or _DEVICES_FLAG in os.environ.get("XLA_FLAGS", ""):
         return

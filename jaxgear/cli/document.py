@@ -62,19 +62,19 @@ _ELSEWHERE = ("title", "design_file", "project", "versions", "geometry", "drawin
 
 @dataclass(frozen=True)
 class CommandResult:
-    """What a command has to say.
+    """Output of a command for the terminal and the report.
 
     Attributes:
-        lines: its results in words.
+        lines: results in words.
         warnings: results that did not converge, or limits that are not met.
-        findings: values out of the usual range; None where they were not checked.
-        tables: those that it prints.
-        figures: files of its pictures.
-        pages: further parts.
-        assumptions: of this command, beside those of every contact analysis.
-        left_out: what of the file is not part of it.
-        first: tables of what is read first.
-        details: how it was found, said last.
+        findings: values out of the usual range; None if they were not checked.
+        tables: tables of results.
+        figures: files of the pictures.
+        pages: further chapters of the report.
+        assumptions: assumptions of this command, beside those of every contact analysis.
+        left_out: parts of the design file that the command ignores and why; "" for none.
+        first: tables before all others.
+        details: lines on how the results were found, printed last.
     """
 
     lines: Sequence[str]
@@ -105,7 +105,7 @@ class Document:
 
     @property
     def facts(self) -> list[tuple[str, str]]:
-        """What identifies the report, but for the versions."""
+        """Name and text of design file, digest, date and command line, for the head of the report."""
         return [
             ("design file", self.source.name),
             ("SHA-256", self.source.sha256),
@@ -197,7 +197,7 @@ def _figures(files: Iterable[Path]) -> list[Chapter]:
 
 
 def _validity(found: CommandResult, data: Mapping[str, Any]) -> Chapter:
-    """What the numbers can be trusted for."""
+    """Chapter on convergence, usual ranges and checks of the results."""
     lines = []
     if not found.warnings:
         lines.append("Every solution converged, and no limit is exceeded.")
@@ -221,7 +221,7 @@ def _validity(found: CommandResult, data: Mapping[str, Any]) -> Chapter:
 
 
 def _inputs(design: DesignFile, data: Mapping[str, Any], found: CommandResult) -> Chapter:
-    """What was assumed."""
+    """Chapter of assumptions and input values."""
     given = {name: data[name] for name in _INPUTS if data.get(name) is not None}
     if "resolution" in given:  # without what is left to its default
         given["resolution"] = {name: size for name, size in given["resolution"].items() if size is not None}
@@ -251,7 +251,7 @@ def _split(title: str, data: Mapping[str, Any]) -> list[Table]:
 
 
 def _all_numbers(data: Mapping[str, Any]) -> list[Chapter]:
-    """What `summary.json` holds beside what stands in other sections."""
+    """Chapter of the numbers in `summary.json` that no other chapter shows; empty list without any."""
     rest = {name: value for name, value in data.items() if name not in (*_INPUTS, *_ELSEWHERE)}
     tables = []
     for name, value in rest.items():

@@ -21,7 +21,7 @@ _SOON = 0.02  # seconds in which Python is out of the callback
 
 @dataclass
 class State:
-    """What has happened in the command that runs."""
+    """Interruption state of the running command."""
 
     asked: bool = False  # a signal came
     held: bool = False  # it has to wait

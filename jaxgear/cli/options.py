@@ -29,5 +29,5 @@ Reported = Annotated[
 
 
 def typed(context: typer.Context, wanted: bool) -> list[str] | None:
-    """What was typed after the name of the program, for a report that is wanted."""
+    """Arguments of the command line if a report is wanted, else None."""
     return list(context.obj) if wanted else None

@@ -123,7 +123,7 @@ def default_folder(file: Path, *command: str, quick: bool = False) -> Path:
 
 
 def _checkpoints(target: Path) -> Checkpoints:
-    """What is kept beside a result folder until it is there; what is said of it when the command is interrupted."""
+    """Checkpoints in a hidden folder beside the result folder; the message of an interruption gives their number."""
     folder = target.parent / f".{target.name}.runs"
 
     def note(count: str) -> None:

@@ -1,6 +1,6 @@
-"""What a command says beside its results: warnings, failures in one line, and an output that takes nothing.
+"""Output streams of a command: warnings, one-line error messages and a closed standard output.
 
-Imports nothing of the library: help and what is wrong with the options need none of it.
+Imports nothing of the library: help and usage errors need none of it.
 """
 
 import logging
@@ -32,7 +32,7 @@ def warnings() -> Iterator[None]:
 
 
 def one_line(error: Exception) -> str:
-    """What has failed, in one line."""
+    """Message of an error in one line."""
     if hasattr(error, "format_message"):  # usage errors of typer
         return f"{' '.join(error.format_message().split())} (jaxgear --help shows the usage)"
     message = " ".join(str(error).split())

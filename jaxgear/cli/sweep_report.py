@@ -1,4 +1,4 @@
-"""What a sweep shows of its table: its best variants, pictures and report."""
+"""Report of a sweep: best variants, figures, workbook and pages."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -77,15 +77,15 @@ CHOSEN = 3  # variants
 
 @dataclass(frozen=True)
 class Chosen:
-    """What was found of the best variants.
+    """Evaluation of the best variants of a sweep.
 
     Attributes:
-        tables: side by side with the unmodified pair, best first.
-        figures: files of their pictures.
-        pages: those of each variant alone, by its name.
-        findings: what is not usual of them; None where they are not evaluated.
+        tables: unmodified pair and variants side by side, best variant first.
+        figures: files of the pictures of all variants together.
+        pages: files of the pictures of each variant beside the unmodified pair, by the name of the variant.
+        findings: values out of the usual range; None if the variants are not evaluated.
         failures: results that did not converge.
-        lines: why they are not evaluated.
+        lines: reason why the variants are not evaluated.
     """
 
     tables: Sequence[Table] = ()
@@ -130,7 +130,7 @@ def evaluate_best(
 
 
 def said_of_best(design: DesignFile, best: SweepTable, size: Resolution) -> tuple[list[str], list[str]]:
-    """By how much the numbers of the best variant change on a finer mesh, and what is not usual of it."""
+    """Lines on the change of the numbers of the best variant on a finer grid, and lines of its findings."""
     parameters = best.take([0]).designs()[0]
     made = design.sweep_mesh(size)
     mesh = made if isinstance(made, Mesh) else made(parameters)

@@ -135,7 +135,7 @@ class FileDesign(eqx.Module):
 
 
 class MeshParts(NamedTuple):
-    """What a mesh is prepared of.
+    """Inputs of a prepared mesh.
 
     Attributes:
         pair: gear pair.
@@ -162,7 +162,7 @@ class FileMesh(eqx.Module):
         return [*self.pair.free(), *self.model.free(), *self.misalignment.free()]
 
     def parts(self, parameters: Mapping[str, Any]) -> MeshParts:
-        """What it is prepared of."""
+        """Gear pair, stiffness model and misaligned axes of the mesh."""
         pair, compliance = self.pair.build(parameters), self.model.build(parameters)
         axes = RigidSupport(pair, self.misalignment.build(parameters)) if self.misalignment.fields else None
         return MeshParts(pair, compliance, axes)
@@ -327,7 +327,7 @@ class DesignFile:
 
     @property
     def left_out(self) -> str:
-        """What of shafts, bearings and housing `mesh` lacks and why, in words; "" for nothing."""
+        """Message naming the shafts, bearings and housing that `mesh` ignores and why, "" for none."""
         if self.support is None:
             return ""
         options = {"open_gears": bool(self._mesh.free()), "vibrates": "dynamics" in self.tables}

@@ -39,7 +39,7 @@ class DynamicsSection(FurtherTable, section_of(Dynamics, ("mesh_frequencies",), 
         dynamics_request(design)
 
     def quantity(self, design: DesignFile, key: str, quantity: Quantity) -> Quantity:
-        """As `FurtherTable.quantity`; some need a speed."""
+        """Quantity with the settings of [dynamics]; a quantity of one speed needs load.speed."""
         name = quantity.name
         if name in AT_SPEED and design.speed is None:
             raise DesignFileError(key, f'"{name}" needs load.speed; "worst_{name}" is that of all speeds of [dynamics]')

@@ -1,4 +1,4 @@
-"""What can be wrong with a design file, always in one line."""
+"""Errors of design files: one-line messages that name file and key."""
 
 import difflib
 import re
@@ -75,7 +75,7 @@ def check_file(path: Path) -> None:
 
 
 def refused(key: str, make: Callable[..., T], *args: object, **kwargs: object) -> T:
-    """What `make` returns; what it refuses is wrong with the key of the design file."""
+    """Result of `make`; raises its ValueError or OverflowError as a `DesignFileError` of the key."""
     try:
         return make(*args, **kwargs)
     except (ValueError, OverflowError) as error:
@@ -90,7 +90,7 @@ def check_known(key: str, name: str, names: Collection[str]) -> None:
 
 
 def problem(error: Exception) -> str:
-    """What the library refuses, without the class that refuses it: a design file has keys."""
+    """Message of an error without the class name at its beginning: a design file has keys."""
     return re.sub(r"\A[A-Z]\w*( \"[^\"]*\")?: ", "", str(error))
 
 
@@ -100,7 +100,7 @@ def not_known(name: object, names: Iterable[str]) -> str:
 
 
 def suggestion(name: object, valid: Iterable[str]) -> str:
-    """What to write instead of a name: the nearest valid one, or all of them where none is near."""
+    """Hint for an unknown name: the nearest valid name, or all of them if none is near."""
     names = sorted(valid)
     near = difflib.get_close_matches(str(name), names, n=1, cutoff=0.5)
     if near:

@@ -36,12 +36,12 @@ _BEYOND, _LEFT_OUT = 0.05, 0.2
 
 @dataclass(frozen=True)
 class FlankRange:
-    """Where the points of a table are.
+    """Range of the points of a flank table.
 
     Attributes:
-        roll_length: first and last [mm].
-        face_coordinate: first and last, from the middle of the gear's face [mm]; the same for a profile alone.
-        step: distance from one to the next [mm]: lines may lie in the middles of slices.
+        roll_length: first and last roll length [mm].
+        face_coordinate: first and last face coordinate from the middle of the gear's face [mm]; equal for a profile.
+        step: largest distance of neighbouring face coordinates [mm]: lines may lie in the middles of slices.
     """
 
     roll_length: tuple[float, float]

@@ -119,7 +119,7 @@ def result_folder(target: str | Path, files: frozenset[str] = frozenset()) -> It
 
 
 def earlier(target: str | Path) -> str:
-    """What of an earlier run a result folder holds, in words; "" for nothing."""
+    """Title, torque and number of figures of the results in a folder, in words; "" without results."""
     try:
         held = json.loads((Path(target) / "summary.json").read_text(encoding="utf-8"))
         torque = held.get("torque_Nm")
@@ -131,7 +131,7 @@ def earlier(target: str | Path) -> str:
 
 
 def _remove_leftovers(parent: Path, target: Path) -> None:
-    """Removes temporary folders of a target whose process is gone; those of other machines nobody here can judge."""
+    """Removes temporary folders of a target whose process has ended; folders of other machines are left alone."""
     named = re.compile(rf"\.{re.escape(target.name)}\.{re.escape(_host())}-(\d+)\.[^.]+\.tmp(\.earlier)?")
     for path in parent.iterdir():
         match = named.fullmatch(path.name)

@@ -96,7 +96,7 @@ class MeshSection(section_of(GearMesh, ("pinion", "wheel", "misalignment"), open
 
 
 class HousingSection(FileTable):
-    """What holds the bearing seats.
+    """Elastic housing that supports the bearing seats.
 
     Attributes:
         file: CSV or npz file beside the design file with the stiffness or compliance of the housing between the seats.
@@ -112,13 +112,13 @@ def over_slices(support: ShaftSupport, sizes: Resolution) -> TabulatedSupport:
 
 
 def left_out(support: ShaftSupport, sizes: Resolution, *, open_gears: bool, vibrates: bool) -> str:
-    """What a mesh without them lacks, and why; "" where the shafts act.
+    """Message naming the shafts, bearings and housing that a mesh ignores and why; "" if the shafts support it.
 
     Args:
-        support: the mesh on its shafts.
-        sizes: of the mesh.
-        open_gears: numbers of the gears or their model are variables.
-        vibrates: the gears vibrate on the mesh.
+        support: shafts, bearings and housing of the mesh.
+        sizes: array sizes of the mesh.
+        open_gears: True if numbers of the gears or their model are variables.
+        vibrates: True if the gears vibrate on the mesh.
     """
     why = _why_rigid(support, sizes, open_gears, vibrates)
     if not why:

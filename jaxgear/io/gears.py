@@ -109,9 +109,9 @@ def flank_of(section: GearSection, folder: Path, gear: Part, *, coast: bool) -> 
 
 
 def drawing_of(section: GearSection) -> dict[str, Any]:
-    """What a file gives of a gear that its numbers do not tell: the name of the material, the measured tooth thickness.
+    """Name of the material and measured tooth thickness of a gear as the file gives them, by name and unit.
 
-    By name and unit; lower and upper limit as a list of both.
+    Limits are a list of the lower and the upper one.
     """
     given, units = section.given(), fields_of(ToothThickness)
     found: dict[str, Any] = {} if isinstance(section.material, Part) else {"material": section.material or _STEEL}

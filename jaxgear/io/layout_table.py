@@ -1,4 +1,4 @@
-"""What the table [layout] of a design file asks for."""
+"""Table [layout] of a design file: settings of the flank line and profile layout."""
 
 import dataclasses
 from collections.abc import Mapping
@@ -59,11 +59,11 @@ class ProfileSection(FileTable):
 
 
 class LayoutSection(FurtherTable):
-    """What `jaxgear layout` does.
+    """Layout of flank lines and profile modifications by `jaxgear layout`.
 
     Attributes:
-        quality_class: flank tolerance class of ISO 1328-1, of both gears or of pinion and wheel; that of the gears
-            without it.
+        quality_class: flank tolerance class of ISO 1328-1, one for both gears or one each for pinion and wheel; the
+            classes of the gears without it.
         misalignment: largest deviations of the axes, each of either sign: `skew` and `inclination` over the
             `bearing_span`, or `direct`, f_ma over the face, as in [misalignment]; "class" takes those of ISO/TR 10064-3
             by F_beta of the quality class, which over the face are the same for every bearing span. Parallel axes
@@ -73,13 +73,13 @@ class LayoutSection(FurtherTable):
         further_crowning: "rule" takes C_b = f_Hbeta of ISO 6336-1 Annex B for both gears and more where that does not
             suffice; "least" takes the least crowning that keeps the load off the edges.
         edge_share: permissible line load at an end of the face, as a share of the largest one inside.
-        negative_crowning: whether the crowning of step 1 may be negative.
+        negative_crowning: True if the crowning of step 1 may be negative.
         stations: number of stations over the face in the analysis of ISO 6336-1 Annex E.
-        torques: on the pinion, of a duty cycle, with the S-N curves of [strength]; the load is levelled at the design
-            torque without it.
+        torques: torques on the pinion of a duty cycle, with the S-N curves of [strength]; the load is levelled at the
+            design torque without it.
         hours: operating hours at every torque.
-        speeds: of the pinion at every torque.
-        profile: profile modifications to be tried in step 3; none without it.
+        speeds: speed of the pinion at every torque.
+        profile: profile modifications to be tried in step 3; no step 3 without it.
     """
 
     table = "layout"

@@ -10,12 +10,12 @@ from .tables import FurtherTable
 
 
 def quantity_named(design: DesignFile, key: str, name: str) -> str | Quantity:
-    """What a name of the vocabulary means in a design file: some quantities come with settings of one of its tables.
+    """Quantity of a vocabulary name, with settings from a table of the design file where the quantity takes some.
 
     Args:
         design: the design file.
-        key: where the name stands.
-        name: in either spelling.
+        key: key that gives the name, for messages.
+        name: name of the quantity, in either spelling.
 
     Raises:
         DesignFileError: for an unknown name, and for one that needs a table or a key that the file does not have.
@@ -45,7 +45,7 @@ def quantities_of_tables(design: DesignFile) -> Iterator[Quantity]:
 
 
 def _missing(design: DesignFile, quantity: Quantity) -> str:
-    """What a design file lacks for a quantity of one of its tables; "" for nothing."""
+    """Table or key that a design file lacks for a quantity, "" for none."""
     assert quantity.takes is not None
     table, settings = quantity.takes.table, design.tables.get(quantity.takes.table)
     if quantity.needs == "dynamics":  # which other settings hold, and a file has a table for

@@ -1,4 +1,4 @@
-"""What the table [optimize] of a design file asks for."""
+"""Table [optimize] of a design file: objective, method and options of a search."""
 
 import dataclasses
 from collections.abc import Callable, Mapping
@@ -202,7 +202,7 @@ class OptimizeSection(FurtherTable):
         design.spectrum(self)
 
     def options(self, method: str) -> dict[str, Any]:
-        """Those of a method, with the defaults of its keys."""
+        """Options of a method, with the defaults of its keys; keys without a value are left out."""
         section = getattr(self, method, None) or method_options().get(method, FileTable)("")
         return {name: value for name in section.keys if (value := getattr(section, name)) is not None}
 
@@ -406,7 +406,7 @@ def _objectives(
 
 
 def _objective(design: DesignFile, section: OptimizeSection, name: str) -> dict[str, Any]:
-    """What the function of a method takes for the objective; nothing where it knows its own."""
+    """Keyword arguments of a method for its objective; empty for a method with a fixed objective."""
     objectives = _objectives(design, section, _FRONT if name == PARETO else ("ppte",))
     if (len(objectives) > 1) != (name == PARETO):
         problem = f'{len(objectives)} with method "{name}": method "pareto" takes several, the others take one'

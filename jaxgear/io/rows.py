@@ -148,7 +148,7 @@ def _csv(path: Path, names: Sequence[str], units: Mapping[str, str]) -> Iterator
     with path.open(encoding="utf-8-sig", newline="") as file:
         headings = [from_text(heading.strip()) for heading in next(text.reader(file), [])]
     places, factors = _columns([_parts(heading) for heading in headings], names, units)
-    numbered = [str(place) for place in range(len(headings))]  # headings that nobody asks for may be there twice
+    numbered = [str(place) for place in range(len(headings))]  # headings of columns that are not read may occur twice
     wanted = [numbered[place] for place in places]
     options = csv.ConvertOptions(column_types=dict.fromkeys(wanted, pyarrow.float64()), include_columns=wanted)
     read = csv.ReadOptions(column_names=numbered, skip_rows=1)

@@ -1,4 +1,4 @@
-"""What the tables [sweep] and [tolerance] of a design file ask for."""
+"""Table [sweep] of a design file: variants and results of a sweep."""
 
 import dataclasses
 from collections.abc import Callable, Mapping

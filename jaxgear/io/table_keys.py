@@ -78,7 +78,7 @@ class FileTable:
         return {name: self._given[name] for name in self.keys if name in self._given}
 
     def changed(self, **values: object) -> Self:
-        """The same with other values of some keys, as if the file set them."""
+        """Copy of the table with other values of some keys, as if the file set them."""
         return type(self)(self.at, **{**self._given, **values})
 
     def refuse(self, keys: Iterable[str], why: str) -> None:
@@ -197,7 +197,7 @@ def built(section: FileTable) -> Any:
 
 
 def as_field(value: Any, number: Number | None) -> Any:
-    """What a `Part` holds for a value: numbers are arrays."""
+    """Value as a field of a `Part`: numbers become arrays."""
     if isinstance(value, list):
         return [as_field(item, number) for item in value]
     if number is None or number.static:
@@ -229,7 +229,7 @@ def snake(name: str) -> str:
 
 
 def meanings(of: Callable[..., object]) -> dict[str, str]:
-    """What every field means, from the list in the docstring of a class, of one that it extends, or of a function."""
+    """Meanings of fields by name, from the docstrings of a class and its bases, or of a function."""
     found: dict[str, str] = {}
     for owner in reversed(of.__mro__) if isinstance(of, type) else [of]:
         block = re.search(r"\n\s*(Attributes|Args):\n(?P<list>.*?)(\n\s*\n|\Z)", owner.__doc__ or "", re.DOTALL)
@@ -247,7 +247,7 @@ def summary(of: object) -> str:
 
 
 def _kind(cls, field: dataclasses.Field[Any], most: int | None, open: bool) -> Kind | None:
-    """What may stand after the key of a field; None where nothing can."""
+    """Kind of value that the key of a field takes; None for a field without a key."""
     number = fields_of(cls).get(field.name)
     if number is not None:
         return _number(number if most is None else dataclasses.replace(number, high=most), open)

@@ -56,13 +56,13 @@ class LoadSection(section_of(OperatingPoint)):  # type: ignore[misc]
 
 @dataclass(frozen=True)
 class Rest:
-    """What every file says, as far as the rules of further tables look at it.
+    """Rest of a design file, as far as the checks of further tables need it.
 
     Attributes:
-        folder: of the file, in which paths begin.
-        names: of the tables that the file has.
-        load: the table of that name.
-        model: likewise.
+        folder: folder of the file, to which its paths are relative.
+        names: names of the tables in the file.
+        load: the table [load].
+        model: the table [model].
         bounds: (low, high) of every free parameter.
         quality_classes: flank tolerance classes of both gears; None where they have none.
     """
@@ -91,11 +91,11 @@ class FurtherTable(FileTable):
 
     @classmethod
     def read(cls, given: Mapping[str, Any], rest: Rest) -> object:
-        """What `DesignFile.tables` holds for the table: an object of this class.
+        """Object that `DesignFile.tables` holds for the table, by default one of this class.
 
         Args:
-            given: the table as it stands in the file.
-            rest: of the file.
+            given: the table as in the file.
+            rest: rest of the file.
 
         Raises:
             DesignFileError: for anything that is wrong with it, in one line that names the key.

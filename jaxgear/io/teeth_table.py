@@ -90,7 +90,7 @@ class TeethSection(FurtherTable):
         teeth_of(design)
 
     def quantity(self, design: DesignFile, key: str, quantity: Quantity) -> Quantity:
-        """Of a revolution with these teeth; orders of a shaft need whole revolutions."""
+        """Quantity of a revolution with these teeth; orders of a shaft need whole revolutions."""
         teeth = teeth_of(design)
         assert teeth.counts is not None
         for gear, number in zip(GEARS, teeth.counts):
@@ -131,7 +131,7 @@ def teeth_of(design: DesignFile) -> Teeth:
 
 
 def _deviations(design: DesignFile, name: str, section: GearTeethSection | None) -> TeethDeviations | None:
-    """Of one gear."""
+    """Deviations of the teeth of one gear; None without its table."""
     if section is None:
         return None
     at, gear, lists = section.at, getattr(design.pair(), name), _lists(design, section)

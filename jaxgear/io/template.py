@@ -66,7 +66,7 @@ class Part(eqx.Module):
             raise DesignFileError(self.key, text) from error
 
     def having(self, **fields: object) -> "Part":
-        """The same with further fields."""
+        """Copy of the part with further fields."""
         return dataclasses.replace(self, fields={**self.fields, **fields})
 
     def free(self) -> list[Free]:

@@ -16,7 +16,7 @@ _DECIMAL_COMMA = re.compile(r"=\s*([+-]?\d+),(\d+)\s*(?:[#,}]|$)")
 
 
 def content(path: Path) -> bytes:
-    """What a file holds.
+    """Bytes of a file.
 
     Raises:
         DesignFileError: when it cannot be read.

@@ -33,7 +33,7 @@ _PURE = (1e-9, 1e9)
 
 
 def outside(number: Number, value: float, *, plausible: bool = True) -> str:
-    """What is wrong with a number, "" if it is finite and within its range and, if `plausible`, an engineer's."""
+    """Message on a number that is not finite, out of its range or, if `plausible`, of an unusual size, else ""."""
     unit = f" {number.unit}" if number.unit else ""
     if isinstance(value, float) and not math.isfinite(value):
         return f"{value} must be finite"
@@ -78,12 +78,12 @@ def allowed(number: Number) -> str:
 
 @dataclass(frozen=True, eq=False)
 class Kind:
-    """What may stand after a key.
+    """Kind of value that a key takes.
 
     Attributes:
-        words: what is allowed, for messages and the reference.
-        read: from a key and what stands after it to the value; raises a `DesignFileError` where that is not allowed.
-        number: unit and range of the number or numbers; None for something else.
+        words: allowed values in words, for messages and the reference.
+        read: function of the key and the raw value that returns the value; raises `DesignFileError` if not allowed.
+        number: unit and range of the number or numbers; None for other values.
         container: list or dict; None for a plain value.
     """
 

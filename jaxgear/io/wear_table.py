@@ -37,7 +37,7 @@ class WearSection(FurtherTable, section_of(Wear, ("dynamics", "loads"), open=Fal
         wear_request(design)
 
     def quantity(self, design: DesignFile, key: str, quantity: Quantity) -> Quantity:
-        """As `FurtherTable.quantity`; blocks are of equal length."""
+        """Quantity with the settings of [wear]; needs `blocks`, which are of equal length."""
         if self.largest_increment is not None and self.blocks is None:
             problem = (
                 f'missing, "{quantity.name}" needs it: wear.largest_increment is for the lives of `jaxgear wear` alone'

@@ -1,4 +1,4 @@
-"""What a mesh does at speed: responses over the frequency, spectra and orders, bifurcations and phase portraits."""
+"""Figures of a mesh at speed: responses over the frequency, spectra and orders, bifurcations and phase portraits."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any, Literal

@@ -1,4 +1,4 @@
-"""What all pictures share: report size, line styles, marks and files."""
+"""Common parts of all figures: report size, line styles, marks and files."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -46,7 +46,7 @@ GREY = "#595959"
 PALE = "#D9D9D9"
 _BOLD, _BEFORE_LINES = 2.6, 2.5  # width [pt] and zorder of the line that a figure is about
 _LEGEND_LINE = 12.0  # [pt]
-_SURELY = 0.9  # share of the width of a new figure's only Axes that is left to them whatever stands beside them
+_SURELY = 0.9  # share of the width of a figure's only Axes; a legend up to this width fits in one row in any layout
 ABOVE = 4.0  # [pt]; between the Axes and a legend over them
 ABOVE_MARKS = 16.0  # [pt]; clears a line of text that stands on the Axes
 

@@ -1,4 +1,4 @@
-"""What is removed from the flanks, and the load and pressure on them."""
+"""Figures of the flanks: material removed, load and pressure."""
 
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -296,7 +296,7 @@ def plane_of_action(cycle: MeshCycle, ax: Axes | None = None) -> Axes:
 
 
 def _over_plane(cycle: MeshCycle, values: Array, label: str, limits: tuple[float, float], ax: Axes | None) -> Axes:
-    """What one pair goes through, over its path and the face, with the contact lines of helical gears."""
+    """Map of the values of one pair over its path and the face, with the contact lines of helical gears."""
     path, face, shown = _placed(cycle, values)
     with report_axes(ax) as ax:
         colour_bar(_draw(ax, path, face, shown, None), ax, label, pad=0.02)

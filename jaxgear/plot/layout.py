@@ -101,7 +101,7 @@ def _radii(cost: np.ndarray) -> np.ndarray:
 
 
 def _texts(values: np.ndarray, named: Sequence[tuple[str, str]]) -> list[list[str]]:
-    """What stands at the spokes of every variant: name, value and unit."""
+    """Labels at the spokes of every variant: name, value and unit."""
     largest = np.abs(values).max(axis=0)
     decimals = np.clip(2 - np.floor(np.log10(np.where(largest > 0, largest, 1.0))), 0, 4).astype(int)
     return [

@@ -26,12 +26,12 @@ def middle_path(cycle: MeshCycle) -> np.ndarray:
 
 
 def path_label(cycles: Iterable[MeshCycle]) -> str:
-    """What positions of pairs on the path of contact are: of helical gears those in the middle of the face."""
+    """Axis label of path positions, which are those at mid-face if any of the cycles is of helical gears."""
     return PATH_LABEL.replace(" [", ", mid-face [") if any(cycle.kinematics.helical for cycle in cycles) else PATH_LABEL
 
 
 def pair_history(cycle: MeshCycle, values: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
-    """What one pair goes through from first to last contact.
+    """Path positions and values of one pair from first to last contact.
 
     All pairs are alike and follow each other at one base pitch, so the pairs of a cycle, put in the order of their path
     positions, are the stages of one pair.

@@ -58,7 +58,7 @@ def costs(values: np.ndarray, columns: Iterable[Of]) -> np.ndarray:
 
 
 def meaning_label(of: Quantity, before: str = "", after: str = "") -> str:
-    """What a quantity means, with its unit in print, between further words."""
+    """Axis label: meaning of a quantity between further words, with its printed unit."""
     return f"{before}{of.meaning or of.words}{after} [{printed_unit(of.unit) or '-'}]"
 
 

@@ -132,7 +132,7 @@ def _shown(table: SweepTable) -> SweepTable:
 
 
 def _data(table: SweepTable) -> tuple[dict[str, Any], int]:
-    """What the page knows, of variants that did not fail, and how many these are."""
+    """Data of the page, of the variants whose numbers are all finite, and the count of these variants."""
     parameters, heads = [column for column in table.columns if column.kind == "parameter"], table.heads
     others = [column for column in table.columns if column.kind == "result" and column not in heads]
     found = table.values(*parameters, *heads, *others)

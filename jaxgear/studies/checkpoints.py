@@ -1,4 +1,4 @@
-"""Results of a study on the disk until all of them are there: an interrupted study goes on where it was."""
+"""Checkpoints: results of a study on disk until it is complete, from which an interrupted study resumes."""
 
 import dataclasses
 import hashlib
@@ -80,9 +80,8 @@ class Checkpoints:
     """Results of a study in a folder, each under the digest of what it was made of.
 
     Args:
-        folder: made with the first result; None keeps nothing.
-        callback: told after every result how many of its kind are there, and how many there will be, None where that
-            is not known.
+        folder: folder of the results, made with the first one; None keeps nothing.
+        callback: called after every result with the number of results of its kind so far and in all, None if unknown.
     """
 
     def __init__(

@@ -1,4 +1,4 @@
-"""What a comparison of designs has found: tables, words, figures and files."""
+"""Result of a comparison of designs: tables, text, figures and files."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -74,7 +74,7 @@ class ComparisonResult(AbstractStudyResult):
         return axes
 
     def headlines(self) -> Iterator[Table]:
-        """What an optimization says before its tables."""
+        """Summary tables of an optimization, shown before all others; none without an optimum."""
         if self.optimum is not None:
             found = self.optimum, self.front, self.projection, self.evaluations
             yield from optimum_report.first_screen(

@@ -127,7 +127,7 @@ class ComparisonRun:
             self._evaluations[name] = dataclasses.replace(claimed, verified=found)
 
     def result(self, tolerance: Tolerance | None) -> ComparisonResult:
-        """What was found, with the scatter of all designs within a tolerance; None for nominal gears alone."""
+        """Result of the comparison, with the scatter of all designs within a tolerance; None for nominal gears only."""
         evaluations = self._evaluations
         if tolerance is not None:
             self._stages.begin("manufacturing the designs within their tolerances")

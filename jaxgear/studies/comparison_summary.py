@@ -85,7 +85,7 @@ def _gear(gear: Gear) -> dict[str, Any]:
 
 
 def _drawn(given: Mapping[str, Any]) -> dict[str, Any]:
-    """What the file gives beside the numbers of the gear, whose names stay those of the numbers that it means."""
+    """Drawing data of the file with `drawn_` before tooth thickness keys, to tell them from the numbers of the gear."""
     return {f"drawn_{name}" if name.startswith("tooth_thickness") else name: value for name, value in given.items()}
 
 

@@ -31,7 +31,7 @@ class DesignAnalysis(AbstractStudy[ComparisonResult]):
 
     @classmethod
     def of(cls, design: DesignFile, *, quick: bool = False) -> Self:
-        """As `AbstractStudy.of`; every variable of the file needs a value."""
+        """Analysis of a design file in which every variable has a value, see `AbstractStudy.of`."""
         free = [name for name in design.bounds if design.open_case or name not in design.values]
         if free:
             says = "give each a value or use jaxgear optimize"

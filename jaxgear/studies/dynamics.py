@@ -80,8 +80,9 @@ def _on(branch: Branch, response: SpeedResponse, place: int) -> bool:
 
 
 def _grid_change(result: DynamicsResult) -> dict[str, dict[str, float]]:
-    """By how much the largest dynamic factor of every design changes at twice the positions of the mesh force and the
-    steps, which meet no more positions than they are themselves."""
+    """Change of the largest dynamic factor of every design at twice the positions of the mesh force.
+
+    The steps of the integrator are doubled too, as they meet no more positions than their number."""
     settings = result.request.settings
     finer = replace(settings, positions=2 * settings.positions)
     last = len(settings.mesh_frequencies)
@@ -151,7 +152,7 @@ class DynamicsStudy(AbstractStudy[DynamicsResult]):
 
     @classmethod
     def of(cls, design: DesignFile, *, quick: bool = False) -> Self:
-        """As `AbstractStudy.of`."""
+        """Speed study of a design file, see `AbstractStudy.of`."""
         return cls(design, quick, dynamics_request(design, quick=quick), search_of(design, quick=quick))
 
     def work_out(self, checkpoints: Checkpoints, stages: Stages) -> DynamicsResult:

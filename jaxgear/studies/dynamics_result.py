@@ -1,4 +1,4 @@
-"""What a speed study has found: its tables, words, figures and files."""
+"""Result of a speed study: tables, text, figures and files."""
 
 import csv
 import dataclasses
@@ -38,20 +38,20 @@ _PANEL, _HEIGHT, _WIDE = 92.0, 94.0, 130.0  # [mm]
 
 @dataclass(frozen=True)
 class DynamicsResult(AbstractStudyResult):
-    """What has been found of all designs.
+    """Result of a speed study of all designs.
 
     Attributes:
         design: the design file.
-        request: what it asks for.
-        mesh: on which the designs are compared.
-        designs: their modifications (pinion, wheel) by name.
-        oscillators: of every design, by torque [N m].
-        natural_frequencies: of the DTE about the static one [Hz], of every design by torque [N m].
-        responses: of every design, by torque [N m] and name of the run.
-        steps: of the integrator per mesh cycle, at every speed.
-        branches: of periodic orbits of the unmodified design, at `torque`.
-        run_ups: of every design, by torque [N m]; empty where none is asked for.
-        grid_change: by how much numbers of every design change at twice the positions of the mesh force and the steps,
+        request: settings of the study in the file.
+        mesh: mesh on which the designs are compared.
+        designs: modifications (pinion, wheel) by design.
+        oscillators: oscillators by design and torque [N m].
+        natural_frequencies: natural frequencies of the DTE about the static one [Hz], by design and torque [N m].
+        responses: speed responses by design, torque [N m] and name of the run.
+        steps: steps of the integrator per mesh cycle, at every speed.
+        branches: branches of periodic orbits of the unmodified design, at `torque`.
+        run_ups: run-ups by design and torque [N m]; empty where none is asked for.
+        grid_change: change of the numbers of every design at twice the positions of the mesh force and twice the steps,
             by name and unit; empty in a quick run.
     """
 

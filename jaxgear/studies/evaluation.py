@@ -158,7 +158,7 @@ def _extremes(*cycles: MeshCycle) -> dict[str, float]:
 
 
 def face_change(before: MeshCycle, after: MeshCycle) -> dict[str, float]:
-    """By how much numbers change from a cycle to the same one on other slices, by name and unit."""
+    """Change of K_Hbeta and extremes from a cycle to one on other slices, by name and unit."""
     found = [{"face_load_factor": float(_face_load([cycle])[0]), **_extremes(cycle)} for cycle in (before, after)]
     return {name: found[1][name] - value for name, value in found[0].items()}
 

@@ -40,7 +40,7 @@ class ExportStudy(AbstractStudy["ExportResult"]):
 
     @classmethod
     def of(cls, design: DesignFile, *, quick: bool = False) -> Self:
-        """As `AbstractStudy.of`."""
+        """Export of a design file, see `AbstractStudy.of`."""
         return cls(design, quick, search_of(design, quick=quick))
 
     def work_out(self, checkpoints: Checkpoints, stages: Stages) -> "ExportResult":

@@ -183,7 +183,7 @@ _HELICAL_PAIR = ("overlap_ratio", "total_contact_ratio", "normal_backlash_um")
 
 
 def gears(file: DesignFile) -> dict[str, dict[str, dict[str, Any]]]:
-    """What every `summary.json` says of the gears: their geometry with that of the pair, and their drawing data.
+    """Geometry of both gears and the pair, and drawing data of the gears, as in every `summary.json`.
 
     Points of the path of contact are positions from the pitch point C, positive towards the tip of the pinion. The
     usable involute runs from the root form diameter to the tip form diameter, and the mate touches it from the active
@@ -207,7 +207,7 @@ def gears(file: DesignFile) -> dict[str, dict[str, dict[str, Any]]]:
 
 
 def mounting(file: DesignFile) -> str:
-    """Both bores, where the bodies are held, and whether anybody has asked for them; how the gears are mounted."""
+    """Line on the bores, the centre distance, the backlash and full root radii of the gears."""
     shape = gears(file)["geometry"]
     texts = []
     for name, gear in (("pinion", file.pair().pinion), ("wheel", file.pair().wheel)):

@@ -85,16 +85,16 @@ class DesignIdentification(AbstractStudy["IdentificationResult"]):
         offset: float = 0.0,
         pitch: bool = False,
     ) -> Self:
-        """As `AbstractStudy.of`.
+        """Identification of the variables of a design file from a measurement, see `AbstractStudy.of`.
 
         Args:
             design: the design file.
-            measured: file of the data, see `io.read_measurement`.
-            quick: a preview on few positions.
-            noise: standard deviation of a reading [um]; None for that of repeats.
-            torque_scale: standard deviation of true over measured torque; 0 for a right one.
-            offset: standard deviation of what is added to every reading [um]; 0 for nothing.
-            pitch: whether single pitch deviations of all teeth are unknown, within f_pT of the class of their gear.
+            measured: file of the measurement, see `io.read_measurement`.
+            quick: True for a preview on few positions.
+            noise: standard deviation of a reading [um]; None estimates it from repeated readings.
+            torque_scale: standard deviation of the ratio of true to measured torque; 0 for an exact torque.
+            offset: standard deviation of an offset added to every reading [um]; 0 for no offset.
+            pitch: True if single pitch deviations of all teeth are unknowns, within f_pT of the class of their gear.
         """
         for name, given in (("torque-scale", torque_scale), ("offset", offset)):
             check("identify", name, given, "um" if name == "offset" else "", low=0.0)
@@ -191,14 +191,14 @@ def _prior(design: DesignFile) -> dict[str, tuple[float, float]]:
 
 @dataclass(frozen=True)
 class IdentificationResult(AbstractStudyResult):
-    """What a measured transmission error says of the variables.
+    """Result of the identification of variables from a measured transmission error.
 
     Attributes:
         design: the design file.
-        measured: file of the data.
-        mesh: on which they were compared.
-        prior: mean and standard deviation of every variable.
-        found: what the data say.
+        measured: file of the measurement.
+        mesh: mesh of the model that was fitted.
+        prior: prior mean and standard deviation of every variable.
+        found: identified values with their uncertainty.
     """
 
     assumptions: ClassVar = ("Noise, priors and the error of the model are normally distributed.",)

@@ -50,7 +50,7 @@ class LayoutStudy(AbstractStudy[LayoutResult]):
 
     @classmethod
     def of(cls, design: DesignFile, *, quick: bool = False) -> Self:
-        """As `AbstractStudy.of`."""
+        """Layout study of a design file, see `AbstractStudy.of`."""
         return cls(design, quick, layout_request(design, quick=quick))
 
     def omits(self) -> str:
@@ -146,7 +146,7 @@ def _over_torque(request: LayoutRequest, layout: FlankLineLayout) -> dict[str, n
 def _contacts(
     request: LayoutRequest, mesh: Mesh, layout: FlankLineLayout, profile: ProfileLayout
 ) -> tuple[dict[str, dict[str, float]], dict[str, dict[str, np.ndarray]]]:
-    """What the contact says of every step without deviations, and its K_Hbeta in the five cases by tolerance."""
+    """Contact results of every step without deviations, and K_Hbeta in the five cases by tolerance and step."""
     found = {}
     cases: dict[str, dict[str, np.ndarray]] = {name: {} for name in request.tolerances}
     deviations = np.concatenate([one.slopes for one in request.tolerances.values()])
@@ -177,7 +177,7 @@ def _cycles(
 
 
 def _factors(request: LayoutRequest, name: str, layout: FlankLineLayout, *, stations: int) -> dict[str, float]:
-    """K_Hbeta of the one-dimensional analysis, on as many stations as the contact has slices."""
+    """K_Hbeta of the one-dimensional analysis by step."""
     found = {}
     face = at_stations(request.supports[name], request.profile_torque, stations=stations)
     for step, (pinion, wheel) in flank_lines(layout).items():

@@ -1,4 +1,4 @@
-"""What a layout study has found: its tables, words, figures and files."""
+"""Result of a layout study: tables, text, figures and files."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -31,26 +31,26 @@ _PANEL, _HEIGHT = 92.0, 90.0  # [mm]
 
 @dataclass(frozen=True)
 class LayoutResult(AbstractStudyResult):
-    """What has been found.
+    """Result of a layout study.
 
     Attributes:
         design: the design file.
-        request: what it asks for.
+        request: settings of the study in the file.
         layouts: flank lines, by the name of the support; the first is that of the design.
         over_torque: K_Hbeta of the design after every of the `STEPS` at the torques of the request, without deviations.
-        meshes: of step 3, by the name of the support; empty without it.
-        contacts: what the contact says of the flank lines of every step on their shafts, by the names of the support
-            and of the step; empty without step 3 on shafts.
+        meshes: meshes of step 3, by the name of the support; empty without step 3.
+        contacts: contact results of the flank lines of every step on their shafts, by the names of the support and of
+            the step; empty without step 3 on shafts.
         contact_cases: K_Hbeta of the contact in the five cases of deviations, by the names of the support, of the
             tolerance and of the step, likewise.
-        cycles: contact of the first support without modification and with all three steps, likewise.
-        factors: K_Hbeta of the one-dimensional analysis at the same torque and on as many stations, likewise.
+        cycles: mesh cycles on the first support, "unmodified" and with all three steps as "layout", likewise.
+        factors: K_Hbeta of the one-dimensional analysis at the torque of the contact and on as many stations as it has
+            slices, by the names of the support and of the step, likewise.
         profiles: profile modifications of step 3, by the name of the support.
-        unusual: what of every layout is not usual, by the name of the support.
-        stations_change: by how much K_Hbeta of the one-dimensional analysis changes at twice the stations, of the
-            design at the torque of the profiles, by step; empty in a quick run.
-        slices_change: by how much numbers of `cycles` change at twice the slices, by name and unit; empty in a quick
-            run.
+        unusual: findings of every layout, by the name of the support.
+        stations_change: change of K_Hbeta of the one-dimensional analysis at twice the stations, of the design at the
+            torque of the profiles, by step; empty in a quick run.
+        slices_change: change of the numbers of `cycles` at twice the slices, by name and unit; empty in a quick run.
     """
 
     design: DesignFile
@@ -168,7 +168,7 @@ class LayoutResult(AbstractStudyResult):
                 yield "every profile modification has contact shock: larger amounts are needed"
 
     def findings(self) -> Iterator[str]:
-        """What is not usual."""
+        """Lines of the findings: values out of the usual range."""
         return finding_lines(self.unusual)
 
     def summary(self) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""What designs are worth once they are made: the scatter over gears within the tolerances of the file."""
+"""Scatter of the results of designs over manufactured gears within the tolerances of the file."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
@@ -120,7 +120,7 @@ def left_out(design: DesignFile, why: str = "") -> str:
 
 
 def tolerances(design: DesignFile) -> dict[str, Any]:
-    """What the table [tolerance] says, as plain data."""
+    """Table [tolerance] as plain data; empty without the table."""
     return {"tolerances": design.tables["tolerance"].given()} if "tolerance" in design.tables else {}
 
 

@@ -37,14 +37,14 @@ class DesignOptimization(AbstractStudy[ComparisonResult]):
 
     @classmethod
     def of(cls, design: DesignFile, *, quick: bool = False, method: str | None = None) -> Self:
-        """As `AbstractStudy.of`; `method` in place of that of the file."""
+        """Optimization of a design file, see `AbstractStudy.of`; `method` replaces that of the file."""
         request = optimize_request(design, method=method, quick=quick)
         with naming(design.path):
             return cls(design, quick, request, tolerance_of(design))
 
     @property
     def folder(self) -> str:
-        """Of the method."""
+        """Folder of the results of the method below that of the design file."""
         return f"{self.name}/{self.request.method}"
 
     def omits(self) -> str:

@@ -1,4 +1,4 @@
-"""What is said and drawn of an optimum, alike for every method."""
+"""Text, tables and figures of an optimum, alike for every method."""
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -44,7 +44,7 @@ class Judged:
     verified: Mapping[str, float]
 
     def change(self, before: float, after: float, than: str) -> str:
-        """What becomes of a number: "31.1 % less than unmodified"; "" where it is not defined."""
+        """Change of a number in words: "31.1 % less than unmodified"; "" if either is not finite."""
         if not (math.isfinite(before) and math.isfinite(after)):
             return ""
         worse = " (worse)" if self.of.sign * (after - before) > 0 else ""
@@ -127,7 +127,7 @@ def front_table(front: Front, evaluations: side_by_side.Evaluations, of_variable
 
 
 def front_rows(front: Front, signs: Sequence[int], evaluations: side_by_side.Evaluations) -> Iterator[tuple[str, str]]:
-    """What the main design of a front is, and how many of the front beat the other designs.
+    """Rows on the compromise of a front, and on the designs of the front that beat the other designs.
 
     Args:
         front: the front.
@@ -233,17 +233,17 @@ def first_screen(
     unusual: Iterable[Finding],
     trust: Iterable[tuple[str, str]],
 ) -> Iterator[Table]:
-    """What an engineer looks for first: what to grind, what it gains and whether to trust it.
+    """Summary tables of an optimization: modification to grind, gain, and checks of the result.
 
     Args:
         file: the design file.
-        optimum: what the search has found.
-        front: of which it is the compromise; None without.
-        projection: of it on a curve.
+        optimum: result of the search.
+        front: Pareto front of which the optimum is the compromise; None without.
+        projection: projection of the optimum on a curve; None without.
         evaluations: designs by their names, the first of which is unmodified.
-        searched_at: positions at which the search began.
+        searched_at: number of positions at which the search began.
         unusual: findings about the design.
-        trust: further rows about the last, such as what is not usual.
+        trust: further rows of the checks, such as findings.
     """
     name, best = side_by_side.main_name(evaluations), side_by_side.main(evaluations)
     rows = [*_overloads(unusual, optimum), *to_grind(optimum.mesh, best.pinion, best.wheel)]
@@ -290,7 +290,7 @@ def _rounding(file: DesignFile, optimum: Optimum) -> Iterator[tuple[str, str]]:
 
 
 def search_lines(optimum: Optimum, front: Front | None, projection: Projection | None) -> Iterator[str]:
-    """How the search has gone, for who wants to know."""
+    """Lines on the search: iterations, projection, first-order optimality and number of analyses."""
     if optimum.objective_name.endswith(PENALIZED):  # no other design pays it
         yield f"{optimum.objective_name}: {optimum.objective:.4g}"
     for step, state in enumerate(optimum.iterations):

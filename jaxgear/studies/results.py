@@ -1,4 +1,4 @@
-"""What a study has found, as the files of a folder."""
+"""Files of the result of a study in a folder."""
 
 from collections.abc import Mapping
 from pathlib import Path

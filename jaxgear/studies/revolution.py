@@ -45,7 +45,7 @@ class RevolutionStudy(AbstractStudy["RevolutionResult"]):
 
     @classmethod
     def of(cls, design: DesignFile, *, quick: bool = False) -> Self:
-        """As `AbstractStudy.of`."""
+        """Revolution study of a design file, see `AbstractStudy.of`."""
         return cls(design, quick, teeth_of(design), search_of(design, quick=quick))
 
     def omits(self) -> str:

@@ -69,7 +69,7 @@ def failures(evaluations: Evaluations) -> Iterator[str]:
 
 
 def findings(file: DesignFile, mesh: Mesh, evaluations: Evaluations) -> dict[str, tuple[Finding, ...]]:
-    """What is not usual of every design."""
+    """Findings of every design, by its name."""
     options: dict[str, Any] = {"torque_range": file.torque_range, "speed": file.speed, "friction": file.friction}
     options |= {"compliance": mesh.compliance, "lubricant": file.tables.get("lubricant")}
     found = {}
@@ -126,18 +126,18 @@ def quantities_of(evaluations: Evaluations) -> list[Quantity]:
 
 
 def objectives(evaluations: Evaluations) -> list[str]:
-    """What an optimization made small, without what is a row of the table anyhow."""
+    """Labels of the objectives of an optimization that are no quantity in the rows of the table."""
     known = {quantity.named for quantity in quantities_of(evaluations)}
     return [label for label in next(iter(evaluations.values())).objectives if label not in known]
 
 
 def verified(evaluations: Evaluations) -> list[Verified]:
-    """What all designs are worth with the finite-element structure; empty where that was not asked for."""
+    """Results of the designs with the finite-element structure; empty if it was not evaluated."""
     return [evaluation.verified for evaluation in evaluations.values() if evaluation.verified is not None]
 
 
 def reduction(evaluations: Evaluations) -> float:
-    """By how much the main design lowers the PPTE of the first, which is unmodified [%]."""
+    """Reduction of the PPTE of the first design, which is unmodified, by the main design [%]."""
     before = next(iter(evaluations.values())).metrics["ppte_um"]
     return 100 * (1 - main(evaluations).metrics["ppte_um"] / before) if before else 0.0
 
@@ -148,7 +148,7 @@ def main(evaluations: Evaluations) -> Evaluation:
 
 
 def main_name(evaluations: Evaluations) -> str:
-    """What the main design is called."""
+    """Name of the main design."""
     return "optimum" if "optimum" in evaluations else list(evaluations)[-1]
 
 

@@ -1,4 +1,4 @@
-"""What a study is: checked when it is made, worked out, and summed up, tabulated and drawn by its result."""
+"""Base classes of studies, checked when made, and of their results: summary, tables, text and figures."""
 
 import abc
 from collections.abc import Iterable, Mapping, Sequence
@@ -16,12 +16,12 @@ R = TypeVar("R", bound="AbstractStudyResult", covariant=True)
 
 
 class AbstractStudyResult(abc.ABC):
-    """What a study has found.
+    """Result of a study.
 
-    All but `summary` have a default: a result of numbers alone needs nothing else.
+    All methods but `summary` have a default: a result of numbers alone needs nothing else.
 
     Attributes:
-        assumptions: of the study, beside those of every contact analysis, for a report.
+        assumptions: assumptions of the study, beside those of every contact analysis, for a report.
     """
 
     assumptions: ClassVar[tuple[str, ...]] = ()
@@ -126,11 +126,11 @@ class AbstractStudy(abc.ABC, Generic[R]):
 
     @abc.abstractmethod
     def work_out(self, checkpoints: Checkpoints, stages: Stages) -> R:
-        """What `run` does.
+        """Calculates the result; `run` calls it.
 
         Args:
-            checkpoints: for what takes long.
-            stages: to be told of every stage.
+            checkpoints: checkpoints of long calculations.
+            stages: progress, told of every stage.
         """
 
     @property
@@ -139,10 +139,10 @@ class AbstractStudy(abc.ABC, Generic[R]):
         return self.name
 
     def omits(self) -> str:
-        """What of the file, but for its shafts, is not part of the study and why; "" for nothing."""
+        """Message naming the tables of the file, but for its shafts, that the study ignores and why; "" for none."""
         return manufactured.left_out(self.design)
 
     @property
     def left_out(self) -> str:
-        """What of the shafts of the file is not part of the study and why; "" for nothing."""
+        """Message naming the shafts, bearings and housing that the study ignores and why; "" for none."""
         return "" if self.takes_shafts else self.design.left_out

@@ -1,4 +1,4 @@
-"""What the `summary.json` of every study says of its design file, its model, its findings and what made it."""
+"""Common parts of `summary.json`: design file, modifications, model, findings and versions."""
 
 import dataclasses
 import platform
@@ -17,7 +17,7 @@ from .version import version
 
 
 def identity(file: DesignFile) -> dict[str, Any]:
-    """What every `summary.json` begins with."""
+    """Title, file name and project data, the beginning of every `summary.json`."""
     project = {"project": file.tables["project"].given()} if "project" in file.tables else {}
     return {"title": file.title, "design_file": file.path.name, **project}
 
@@ -28,7 +28,7 @@ def flanks_data(pinion: AbstractModification, wheel: AbstractModification) -> di
 
 
 def versions() -> dict[str, str]:
-    """Of everything that a result depends on, by name."""
+    """Versions of everything that a result depends on, by name."""
     return {
         "jaxgear": version(),
         "jax": jax.__version__,

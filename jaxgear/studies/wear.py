@@ -46,7 +46,7 @@ class WearStudy(AbstractStudy[WearResult]):
 
     @classmethod
     def of(cls, design: DesignFile, *, quick: bool = False) -> Self:
-        """As `AbstractStudy.of`."""
+        """Wear study of a design file, see `AbstractStudy.of`."""
         request = wear_request(design, quick=quick)
         search = search_of(design, quick=quick)
         # a step of the search wears a life: under the static load, which takes far less than a motion in every block

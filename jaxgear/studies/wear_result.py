@@ -1,4 +1,4 @@
-"""What a wear study has found: its tables, words, figures and files."""
+"""Result of a wear study: tables, text, figures and files."""
 
 import csv
 import dataclasses
@@ -74,7 +74,7 @@ class WearResult(AbstractStudyResult):
     scatters: Mapping[str, wear_scatter.Samples]
 
     def _numbers(self, history: WearHistory) -> dict[str, float]:
-        """What a wear history comes to."""
+        """Scalar results of a wear history, by name and unit."""
         ppte, settings = np.asarray(over_life(history, "ppte")), self.request.settings
         volume = np.asarray(worn_volume(history))[-1]
         found = {

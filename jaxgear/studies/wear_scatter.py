@@ -1,4 +1,4 @@
-"""What the designs of a wear study are worth once they are made: lives of gears within the tolerances of the file."""
+"""Scatter of the wear of designs over manufactured gears within the tolerances of the file."""
 
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
@@ -175,7 +175,7 @@ def _bound(samples: Samples, name: str) -> float:
 def _lasts(samples: Samples, name: str, share: float) -> float:
     """The longest life of a pair that at least a share of the pairs reach; NaN where failed ones are among the others.
 
-    No mean of the lives about that place, as quantiles are elsewhere: many are zero, or as long as anybody has looked.
+    Not a mean of neighbouring lives, as other quantiles are: many lives are zero or end with the range computed.
     """
     values = samples[name]
     lives = np.sort(np.where(np.isfinite(values), values, -np.inf))

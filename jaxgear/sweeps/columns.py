@@ -25,7 +25,7 @@ def as_text(heading: str) -> str:
 
 
 def from_text(heading: str) -> str:
-    """What `as_text` was given."""
+    """Heading without the mark of `as_text`."""
     plain = heading.removeprefix(_TEXT)
     return plain if plain.startswith(_FORMULA) else heading
 

@@ -25,7 +25,7 @@ FEW = 256
 
 
 class _Task(NamedTuple):
-    """What is compiled for: everything that is neither an array nor its shape."""
+    """Static arguments of the compiled evaluation: everything that is neither an array nor its shape."""
 
     rest: tuple[Any, ...]
     results: tuple[Quantity, ...]

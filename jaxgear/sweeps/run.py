@@ -30,8 +30,8 @@ from .plan import AbstractPlan
 from .store import MANIFEST, Manifest, Store, load_manifest
 from .table import SweepTable, in_memory, open_sweep
 
-PART_ROWS = 2**17  # most variants of a part that nobody has asked for
-_PARTS = 64  # so many of a sweep: an interruption costs a small share of it
+PART_ROWS = 2**17  # largest default number of variants of a part
+_PARTS = 64  # default number of parts of a sweep: an interruption costs a small share of it
 _SHARED_ROWS = 1024  # least of a part where several processes, of any devices, have to agree
 _IN_FLIGHT = 2  # parts: one that the devices work on while the host writes the other
 _POLL = 0.2  # seconds between two looks for the parts of other processes
@@ -154,7 +154,7 @@ def sweep(
 
 
 def _part_rows(made: Variants, example: np.ndarray, variants: int, output: str | Path | None) -> int:
-    """Variants per part where nobody says: those of the sweep that is there, or of so many parts."""
+    """Default number of variants per part: as in the sweep already in the folder, or for about `_PARTS` parts."""
     if output is None:
         return PART_ROWS
     if (Path(output) / MANIFEST).is_file():

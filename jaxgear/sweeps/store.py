@@ -35,11 +35,11 @@ _log = logging.getLogger("jaxgear")
 
 
 class Manifest(NamedTuple):
-    """What a sweep is.
+    """Description of a sweep.
 
     Attributes:
         title: free text.
-        columns: of the table.
+        columns: columns of the table.
         settings: everything that determines the rows, as plain data; `variants` and `part_rows` among it.
     """
 
@@ -96,12 +96,12 @@ class Store:
         self.manifest, self._schema = there, _schema(there)  # all parts have one title and one set of units
 
     def found(self) -> dict[int, Path]:
-        """The parts that are there, by their number; `unsound` reads them."""
+        """Paths of the parts in the folder by part number, without a check, see `unsound`."""
         matches = ((_PART.fullmatch(path.name), path) for path in sorted(self.folder.iterdir()))
         return {int(match[1]): path for match, path in matches if match}
 
     def unsound(self, paths: Iterable[Path]) -> list[Path]:
-        """Those of some parts that are damaged, displaced or of another sweep."""
+        """Paths of parts that are damaged, displaced or of another sweep."""
         return [path for path in paths if not self._is_sound(path)]
 
     def clean(self, parts: range) -> None:
@@ -220,7 +220,7 @@ def _parquet(table) -> memoryview:
     import pyarrow.parquet as parquet
 
     file = pyarrow.BufferOutputStream()
-    # these numbers never repeat and hardly compress: a fast codec, no dictionary
+    # these numbers never repeat and do not compress well: a fast codec, no dictionary
     options = {"compression": "zstd", "compression_level": 1, "use_dictionary": False, "write_page_checksum": True}
     parquet.write_table(table, file, **options)
     return memoryview(file.getvalue())

@@ -40,7 +40,7 @@ def unpacked(held: bytes) -> bytes:
                 raise DesignFileError("", f"holds {len(archive.infolist())} files, must be at most {_MOST_MEMBERS}")
             found = _model(archive)
             if found.flag_bits & _ENCRYPTED or found.compress_type not in _KNOWN:
-                raise DesignFileError("", f"{found.filename}: is encrypted or compressed otherwise than by deflate")
+                raise DesignFileError("", f"{found.filename}: is encrypted or compressed other than by deflate")
             with archive.open(found) as member:
                 content = member.read(_MOST + 1)
     except DesignFileError:

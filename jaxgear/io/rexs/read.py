@@ -45,14 +45,14 @@ _GEOMETRY = (
 
 @dataclass(frozen=True)
 class RexsPair:
-    """What a REXS file says of a cylindrical stage.
+    """Cylindrical stage of a REXS file.
 
     Attributes:
         title: name of the model, "" where it has none.
         pair: the gears; gear 1 of the stage is the pinion, which drives.
         pinion, wheel: modifications of the flanks.
-        torque: on the pinion [N m], None where the file names none.
-        speed: of the pinion [rpm], likewise.
+        torque: torque on the pinion [N m], None if the file gives none.
+        speed: speed of the pinion [rpm], None if the file gives none.
         quality_classes: flank tolerance classes of pinion and wheel (ISO 1328-1:2013), None where a gear has none.
     """
 
@@ -253,7 +253,7 @@ def _driving_first(model: Model, stage: Component) -> list[Component]:
 
 
 def _data(model: Model, stage: Component, gear: Component) -> list[Component]:
-    """What the stage says of one of its gears."""
+    """Components `stage_gear_data` of one gear of the stage."""
     found = model.related("stage_gear_data", "stage", stage.id, "stage_gear_data")
     return [part for part in found if gear in model.related("stage_gear_data", "stage_gear_data", part.id, "gear")]
 
@@ -298,7 +298,7 @@ def _flank(model: Model, gear: Component, wanted: str | None) -> Component:
     if wanted is not None:
         return found[wanted]
     if len(flanks) > 1 and _said(model, flanks[0]) != _said(model, flanks[1]):
-        problem = f"is modified otherwise than flank {flanks[1].id}, choose left or right (flank)"
+        problem = f"has other modifications than flank {flanks[1].id}, choose left or right (flank)"
         raise flanks[0].refuse("", problem)
     return flanks[0]
 

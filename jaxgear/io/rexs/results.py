@@ -1,4 +1,4 @@
-"""What a loaded tooth contact has found, as `meshing_contact_stage_data_set` of REXS."""
+"""Results of a loaded tooth contact as `meshing_contact_stage_data_set` of REXS."""
 
 import numpy as np
 
@@ -30,7 +30,7 @@ def write_results(
     shape = cycle.line_load.shape
 
     def everywhere(field) -> np.ndarray:
-        """Of every contact, what the slices of spur gears have in common."""
+        """Values of every contact; the slices of spur gears share them."""
         return np.broadcast_to(np.asarray(over_slices(field)), shape)
 
     places = np.nonzero(everywhere(kinematics.contact_outside) == 0)

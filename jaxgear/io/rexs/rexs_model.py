@@ -55,11 +55,11 @@ _OWN = {
 
 @dataclass(frozen=True)
 class Attribute:
-    """What a component says of itself.
+    """Attribute of a component.
 
     Attributes:
         value: text of a scalar, texts of an array, None for a matrix or another nested value.
-        unit: None where the file names none.
+        unit: unit as the file names it, None without one.
         kind: type of the value by its name in REXS, "" where the file does not say.
     """
 
@@ -167,7 +167,7 @@ class Component:
 
 @dataclass(frozen=True)
 class Relation:
-    """What several components have to do with each other: (role, id of the component) of each."""
+    """Relation of several components: type, and (role, id) of each component."""
 
     type: str
     refs: tuple[tuple[str, int], ...]
@@ -176,13 +176,13 @@ class Relation:
 
 @dataclass
 class Model:
-    """What a file holds.
+    """Components, relations and load cases of a REXS file.
 
     Attributes:
-        version: of REXS.
-        components: by their ids.
-        relations: in their order.
-        cases: of the load spectrum by their ids; each holds what a component says under this load.
+        version: version of REXS.
+        components: components by id.
+        relations: relations in their order.
+        cases: load cases of the spectrum by id; each holds components with their attributes under this load, by id.
     """
 
     version: str
@@ -227,7 +227,7 @@ class Model:
         self.relations.append(Relation(kind, tuple((role, part.id) for role, part in roles.items()), order))
 
     def under_load(self, case: int, component: Component, **values: tuple[Any, str]) -> None:
-        """What a component says in a load case."""
+        """Sets the attributes of a component in a load case; values are (value, unit)."""
         said = Component(component.id, component.type, component.name, attributes_of(values))
         self.cases.setdefault(case, {})[component.id] = said
 

@@ -126,7 +126,7 @@ def write_rexs(
 
 
 def _of_cycle(pair, cycle: MeshCycle, pinion, wheel, torque, speed, friction):
-    """What a cycle says of its modifications and operating point."""
+    """Modifications, torque, speed and friction of a mesh cycle that can be written; raises for any other."""
     for name, given in (("pinion", pinion), ("wheel", wheel), ("torque", torque)):
         if given is not None:
             raise ValueError(f"write_rexs: {name} has no effect with cycle, leave it out")
