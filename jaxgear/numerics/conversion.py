@@ -18,7 +18,7 @@ class Callback(Protocol):
     """Function that is called with the progress of a sweep or a search; an exception in it ends the work."""
 
     def __call__(self, done: int, total: int, best: float | None, /) -> None:
-        """Receive the number of variants or steps done, their total and the best objective so far (None without one)."""
+        """Receive the variants or steps done, their total number and the best objective so far (None without one)."""
 
 
 _SHOWN = 6  # numbers of an array that are printed; of a longer one its range is

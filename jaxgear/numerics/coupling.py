@@ -46,7 +46,8 @@ class Held(NamedTuple):
     """Inverses and products of a coupling that its eliminations share.
 
     Attributes:
-        local: rest C, summed over both bodies, of the springs that can touch; with an axis of slices where the springs are scaled.
+        local: rest C, summed over both bodies, of the springs that can touch; with an axis of slices where they are
+            scaled.
         inverse: inverse of C.
         share_inverse: inverse of M.
         modal: inverse of the sum of M x C over both bodies, where there is an `other`; None without one.
