@@ -160,7 +160,7 @@ def _tilt(moving: Kinematics, slopes: Float[Array, "gears"]) -> Float[Array, "sl
 
 
 def _polynomials(sizes: Resolution) -> Float[np.ndarray, "slices bends"]:
-    """Polynomials of degree 0, 1, ... at the middles of the slices, one per mode, orthonormal with the slice weights."""
+    """Polynomials of degree 0, 1, ... at the middles of the slices, one per mode, orthonormal by the slice weights."""
     edges, count = sizes.slice_edges, min(sizes.face_modes, sizes.slices)
     root = np.ones(sizes.slices) if sizes.slice_weights is None else np.sqrt(sizes.slice_weights)
     powers = np.polynomial.legendre.legvander(edges[1:] + edges[:-1], count - 1)

@@ -126,7 +126,7 @@ class Resolution(Checked):
 
     @property
     def of_arrays(self) -> "Resolution":
-        """Sizes that the arrays of a prepared mesh depend on, all else at its default: one program serves many meshes."""
+        """Sizes that the arrays of a prepared mesh depend on, all else at its default: one program serves many."""
         plain = self._plain(slice_widths=self.parts, extended_contact=self.extended_contact)
         if self.slices == 1:
             return plain
@@ -146,7 +146,7 @@ class Resolution(Checked):
         return self._plain(newton_steps=steps, rtol=rtol)
 
     def _plain(self, **sizes: object) -> "Resolution":
-        """This number of positions, slices and pairs, all else at its default; unchecked: a single position is allowed."""
+        """These positions, slices and pairs, all else at its default; unchecked, so that a single position is allowed."""
         return changed(Resolution(), positions=self.positions, slices=self.slices, pairs=self.pairs, **sizes)
 
     @property

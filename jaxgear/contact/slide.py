@@ -63,8 +63,8 @@ class RemovedMaterial(Checked):
 
     Attributes:
         amount: gap minus that of the unmodified flanks [um], shape (pairs, slices, positions).
-        shift: shift of the centre of contact along the flanks, positive towards the pinion tip [mm], shape (pairs, slices or
-            1, positions).
+        shift: shift of the centre of contact along the flanks, positive towards the pinion tip [mm], shape (pairs,
+            slices or 1, positions).
         relative_curvature: curvature that the removed material adds, times the relative radius of the flanks; of the
             same shape.
     """
@@ -210,7 +210,7 @@ def loaded_material(
         mesh: prepared mesh.
         torque: torque on the pinion [N m].
         pinion, wheel: modifications.
-        first_contact: function that gives line loads [N/mm] and residual of the contact on material that has been removed.
+        first_contact: function that gives line loads [N/mm] and residual of the contact for a removed material.
         own: further modifications of every pair, see `slid_material`.
     """
     if own is None and isinstance(pinion, NoModification) and isinstance(wheel, NoModification):
