@@ -27,9 +27,8 @@ class AbstractCompliance(eqx.Module):
     Attributes:
         plane: "auto", "stress" or "strain". The contact and its pressure are in plane stress for "stress" only; teeth
             and bodies use it as each model defines (`plane_stress_share`: where a gear lies between both).
-        averages_over_loaded_width: True if the compliance is accurate enough for modifications to be averaged over the width that
-            every contact's own load makes it, which takes a second contact solution; else over that of one pair that
-            carries the full load.
+        averages_over_loaded_width: True if modifications are averaged over the width by every contact's own load, which
+            takes a second contact solution; else over the width by the usual load of unmodified flanks.
     """
 
     plane: eqx.AbstractVar[PlaneState]
@@ -62,7 +61,7 @@ class AbstractCompliance(eqx.Module):
         """Wind-up of the bodies of pinion and wheel, in um per N/mm of total line load over their own faces."""
 
     def slope(self, pinion: ToothLoad, wheel: ToothLoad) -> Float[Array, "gears"]:
-        """Slope of both bodies at the rim along the radius under an axial force there [um/N per mm]; zero by default."""
+        """Slope of both bodies at the rim along the radius by an axial force there [um/N per mm]; zero by default."""
         return jnp.zeros((2,), pinion.roll_length.dtype)
 
     @abstractmethod

@@ -81,8 +81,8 @@ class AbstractBody(Checked):
 
     @abstractmethod
     def hub(self, outline: Outline) -> Float[Array, ""]:
-        """Deflection of the body that all teeth share, on the line of action, in um per N/mm of total line load: rotation
-        of the root circle against the bore, for helical gears also the axial deflection.
+        """Deflection that all teeth share, on the line of action, in um per N/mm of total line load: rotation of the
+        root circle against the bore, for helical gears also the axial deflection of the body.
         """
 
 

@@ -73,7 +73,7 @@ def _shear(ratio: Scalar) -> Scalar:
 
 
 def _low_order(order: int, ratio: Scalar, poisson: Scalar) -> Edge:
-    """Bending compliance in harmonic 0 or 1, where two of the four functions or one are powers with a logarithm."""
+    """Bending compliance in harmonic 0 or 1, where some of the four functions are powers with a logarithm."""
     powers = jnp.asarray([0.0, 2.0, 0.0, 2.0] if order == 0 else [1.0, 3.0, -1.0, 1.0], ratio.dtype)
     logarithmic = np.array([False, False, True, True] if order == 0 else [False, False, False, True])
     log = jnp.log(ratio)
@@ -87,7 +87,7 @@ def _low_order(order: int, ratio: Scalar, poisson: Scalar) -> Edge:
 
 
 def _of_powers(order: Scalar, ratio: Scalar, poisson: Scalar) -> Edge:
-    """Bending compliance in harmonic 2 or higher; falling powers are scaled to 1 at the bore, so that none overflows."""
+    """Bending compliance in harmonic 2 or higher; falling powers are scaled to 1 at the bore, to avoid overflow."""
     powers = jnp.stack([order, order + 2, -order, 2 - order])
     fade = jnp.stack([jnp.ones_like(order), jnp.ones_like(order), ratio**order, ratio ** (order - 2)])
     value = jnp.stack([ratio**order, ratio ** (order + 2), jnp.ones_like(order), jnp.ones_like(order)])
@@ -110,6 +110,6 @@ def _with_logarithm(powers: Array, order: int, poisson: Scalar) -> tuple[Array, 
 
 
 def _at_force(rows: Float[Array, "4 4"], there: Float[Array, "2 4"]) -> Edge:
-    """Deflection and slope at the edge under a unit force of the harmonic, clamped at the bore, without outer moment."""
+    """Deflection and slope at the edge by a unit force of the harmonic, clamped at the bore, without outer moment."""
     unit = jnp.asarray([0.0, 0.0, 0.0, -1.0], rows.dtype)
     return there @ solve_dense(rows, unit)

@@ -146,7 +146,7 @@ class Resolution(Checked):
         return self._plain(newton_steps=steps, rtol=rtol)
 
     def _plain(self, **sizes: object) -> "Resolution":
-        """These positions, slices and pairs, all else at its default; unchecked, so that a single position is allowed."""
+        """These positions, slices and pairs, all else at its default; unchecked, as a single position is allowed."""
         return changed(Resolution(), positions=self.positions, slices=self.slices, pairs=self.pairs, **sizes)
 
     @property
