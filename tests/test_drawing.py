@@ -433,7 +433,7 @@ REFUSED = {
     "form circle of meeting chamfers": (
         "tip_form_diameter = 59.0",
         "",
-        "pinion.tip_form_diameter: 59 mm leaves no tip land: chamfers of 45 degrees are there 2.3 mm high",
+        "pinion.tip_form_diameter: 59 mm leaves no tip land: chamfers of 45 degrees would be 2.3 mm high",
     ),
     "form circle inside": ("tip_form_diameter = 50.0", "", "pinion.tip_form_diameter: 50 mm must be greater than 53."),
 }

@@ -22,26 +22,25 @@ Outside = Float[Array, "pairs positions"]
 
 
 class AbstractCompliance(eqx.Module):
-    """What a prepared mesh needs to know of the elasticity of both gears: composed of models, or a table.
+    """Elasticity of both gears for a prepared mesh: composed of models, or a table.
 
     Attributes:
-        plane: "auto", "stress" or "strain". The contact and its pressure are in plane stress for "stress" only; what
-            the structure makes of it is its own affair (`plane_stress_share` tells where a gear lies between both).
-        averages_over_loaded_width: whether it is accurate enough for modifications to be averaged over the width that
-            every contact's own load makes it, which takes a second contact solution; else over that of one pair that
-            carries the full load.
+        plane: "auto", "stress" or "strain". The contact and its pressure are in plane stress for "stress" only; teeth
+            and bodies use it as each model defines (`plane_stress_share`: where a gear lies between both).
+        averages_over_loaded_width: True if modifications are averaged over the width by every contact's own load, which
+            takes a second contact solution; else over the width by the usual load of unmodified flanks.
     """
 
     plane: eqx.AbstractVar[PlaneState]
     averages_over_loaded_width: ClassVar[bool] = False
 
     def of_gears(self, pinion: Outline, wheel: Outline, count: int) -> "AbstractCompliance":
-        """The same for these gears alone, with what does not depend on the positions evaluated; the model itself where
-        there is nothing of that kind.
+        """Compliance for these gears alone, with everything evaluated that does not depend on the positions; by default
+        the model itself.
 
         Args:
             pinion: outline of the pinion's teeth.
-            wheel: the same of the wheel.
+            wheel: outline of the wheel's teeth.
             count: tooth pairs that are carried along.
         """
         return self
@@ -50,11 +49,11 @@ class AbstractCompliance(eqx.Module):
     def structure(self, pinion: ToothLoad, wheel: ToothLoad) -> Structures:
         """Compliance of teeth and bodies between all pairs in contact [um per N/mm], without hub wind-up.
 
-        That of pinion and wheel, each under a load that is uniform over its own face.
+        One matrix for the pinion and one for the wheel, each under a load that is uniform over its own face.
 
         Args:
             pinion: load lines of all contacts on the pinion, fields of shape (pairs, positions).
-            wheel: the same on the wheel.
+            wheel: load lines of all contacts on the wheel, likewise.
         """
 
     @abstractmethod
@@ -62,9 +61,7 @@ class AbstractCompliance(eqx.Module):
         """Wind-up of the bodies of pinion and wheel, in um per N/mm of total line load over their own faces."""
 
     def slope(self, pinion: ToothLoad, wheel: ToothLoad) -> Float[Array, "gears"]:
-        """Of both bodies at the rim in the direction of the radius under an axial force there [um/N per mm]; zero
-        where they are taken not to turn.
-        """
+        """Slope of both bodies at the rim along the radius by an axial force there [um/N per mm]; zero by default."""
         return jnp.zeros((2,), pinion.roll_length.dtype)
 
     @abstractmethod

@@ -62,13 +62,13 @@ class AbstractBody(Checked):
         """
 
     def of_gears(self, pinion: Outline, wheel: Outline, count: int, planes: tuple[Plane, ...]) -> PyTree | None:
-        """What `of_both` of so many pairs needs that is the same at all positions; None for nothing."""
+        """Data of `of_both` for `count` pairs that are the same at all positions; None without any."""
         return None
 
     def of_both(
         self, pinion: ToothLoad, wheel: ToothLoad, planes: tuple[Plane, ...], known: PyTree | None = None
     ) -> tuple[Matrices, Matrices]:
-        """`compliance` of driving and driven gear, each in several planes; `known` is what `of_gears` has given."""
+        """`compliance` of driving and driven gear, each in several planes; `known` is the result of `of_gears`."""
         first, second = (
             jnp.stack([self.compliance(load, step, plane) for plane in planes])
             for load, step in ((pinion, +1), (wheel, -1))
@@ -76,13 +76,13 @@ class AbstractBody(Checked):
         return first, second
 
     def slope(self, outline: Outline) -> Float[Array, ""]:
-        """Of the body at its rim in the direction of the radius under an axial force there [um/N per mm]."""
+        """Slope of the body at its rim along the radius under an axial force there [um/N per mm]; zero by default."""
         return jnp.zeros_like(outline.gear.base_radius)
 
     @abstractmethod
     def hub(self, outline: Outline) -> Float[Array, ""]:
-        """What all teeth share: rotation of the root circle against the bore, and of helical gears the axial deflection
-        of the body, on the line of action, in um per N/mm of total line load.
+        """Deflection that all teeth share, on the line of action, in um per N/mm of total line load: rotation of the
+        root circle against the bore, for helical gears also the axial deflection of the body.
         """
 
 

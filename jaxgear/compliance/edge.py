@@ -53,15 +53,15 @@ _CHAMFER_ANGLE = np.pi / 4
 
 
 class Edge(eqx.Module):
-    """Where the nearest tip corner is; fields of shape (pairs, 1, positions).
+    """Nearest tip corner of every contact; fields of shape (pairs, 1, positions).
 
     Attributes:
-        distance: of the contact's centre from the corner along the tip's flank [mm], negative beyond the corner; of
-            slices on their own where the contacts of these have moved.
+        distance: distance of the contact's centre from the corner along the tip's flank [mm], negative beyond the
+            corner; with an axis of slices where the contacts have moved.
         side: +1 where the corner is that of the pinion, -1 where it is that of the wheel.
         wedge: excess apex compliance of the tip wedge over the half plane, (K - 2 / pi) / E' [um per N/mm].
         reach: distance from the corner at which that excess ends [mm].
-        chamfer: what the chamfer behind the corner changes; None where neither tip has one.
+        chamfer: wedge between flank and chamfer; None where neither tip has a chamfer.
     """
 
     distance: Float[Array, "pairs anyslices positions"]

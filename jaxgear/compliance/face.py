@@ -98,7 +98,7 @@ def _near_ends(
 
 
 def _images(ends: Float[Array, "slices 2"], width: Scalar, decay: Scalar) -> Kernel:
-    """What mirror images at both ends add to the kernel exp(-|y - y'| / l) / 2 l of an infinite face [1/mm].
+    """Part that mirror images at both ends add to the kernel exp(-|y - y'| / l) / 2 l of an infinite face [1/mm].
 
     The kernel cosh((y< + b/2) / l) cosh((b/2 - y>) / l) / (l sinh(b / l)) less that one, in terms of the distances from
     the ends, which stay finite on wide faces.

@@ -1,4 +1,4 @@
-"""What a tip corner leaves of a contact; `edge` has the formulas."""
+"""Contact that a tip corner cuts off; `edge` has the formulas."""
 
 from typing import NamedTuple
 

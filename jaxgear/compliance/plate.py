@@ -37,11 +37,11 @@ _SHEAR_FACTOR = 5 / 6  # of a plate (Reissner)
 
 
 class AxialCompliance(NamedTuple):
-    """What an axial force at the reference circle does to it, at the force; bending without shear turns the section.
+    """Compliance of a gear body under an axial force at its reference circle, at the place of the force.
 
     Attributes:
-        deflection: along the axis [um/N].
-        slope: of the body in the direction of the radius [um/N per mm].
+        deflection: deflection along the axis, by bending and shear [um/N].
+        slope: slope of the body along the radius, by bending [um/N per mm].
     """
 
     deflection: Scalar
@@ -49,7 +49,7 @@ class AxialCompliance(NamedTuple):
 
 
 def axial_compliance(gear: Gear) -> AxialCompliance:
-    """Of the body of a gear, held at its bore."""
+    """Axial compliance of the body of a gear clamped at its bore."""
     radius, width, material = gear.pitch_radius, gear.face_width, gear.material
     ratio, poisson = gear.bore_radius / radius, material.poisson_ratio
     stiffness = material.elastic_modulus * width**3 / (12 * (1 - poisson**2))
@@ -59,21 +59,21 @@ def axial_compliance(gear: Gear) -> AxialCompliance:
 
 
 def _bending(ratio: Scalar, poisson: Scalar) -> Edge:
-    """Of all harmonics together, times pi times the stiffness of the plate over the square of the radius."""
+    """Sum over harmonics of the bending compliance of the plate, times pi D / r^2."""
     orders = jnp.arange(2, _HARMONICS + 1).astype(ratio.dtype)
     higher = jnp.sum(jax.vmap(lambda n: _of_powers(n, ratio, poisson))(orders), axis=0)
     return 0.5 * _low_order(0, ratio, poisson) + _low_order(1, ratio, poisson) + higher
 
 
 def _shear(ratio: Scalar) -> Scalar:
-    """The deflection by shear alone, times pi times the shear stiffness of the plate."""
+    """Deflection by shear alone, times pi times the shear stiffness of the plate."""
     order = jnp.arange(1, _HARMONICS + 1).astype(ratio.dtype)
     faded = ratio ** (2 * order)
     return -0.5 * jnp.log(ratio) + jnp.sum((1 - faded) / ((1 + faded) * order))
 
 
 def _low_order(order: int, ratio: Scalar, poisson: Scalar) -> Edge:
-    """Of harmonic 0 or 1, where two of the four functions are powers with a logarithm."""
+    """Bending compliance in harmonic 0 or 1, where some of the four functions are powers with a logarithm."""
     powers = jnp.asarray([0.0, 2.0, 0.0, 2.0] if order == 0 else [1.0, 3.0, -1.0, 1.0], ratio.dtype)
     logarithmic = np.array([False, False, True, True] if order == 0 else [False, False, False, True])
     log = jnp.log(ratio)
@@ -87,7 +87,7 @@ def _low_order(order: int, ratio: Scalar, poisson: Scalar) -> Edge:
 
 
 def _of_powers(order: Scalar, ratio: Scalar, poisson: Scalar) -> Edge:
-    """Of a harmonic from the second on; powers that fall off have their value at the bore, so that none overflows."""
+    """Bending compliance in harmonic 2 or higher; falling powers are scaled to 1 at the bore, to avoid overflow."""
     powers = jnp.stack([order, order + 2, -order, 2 - order])
     fade = jnp.stack([jnp.ones_like(order), jnp.ones_like(order), ratio**order, ratio ** (order - 2)])
     value = jnp.stack([ratio**order, ratio ** (order + 2), jnp.ones_like(order), jnp.ones_like(order)])
@@ -104,12 +104,12 @@ def _at_edge(powers: Array, order: Scalar | int, poisson: Scalar) -> tuple[Array
 
 
 def _with_logarithm(powers: Array, order: int, poisson: Scalar) -> tuple[Array, Array]:
-    """The same of x^p ln(x), the derivatives by the power."""
+    """Moment and shear force of x^p ln(x) as in `_at_edge`: the derivatives of those of x^p by p."""
     moment = 2 * powers - 1 + poisson
     return moment, 3 * powers**2 - 4 * powers - order**2 * (2 - poisson)
 
 
 def _at_force(rows: Float[Array, "4 4"], there: Float[Array, "2 4"]) -> Edge:
-    """At the edge under a unit force of the harmonic, clamped at the bore and free of moments outside."""
+    """Deflection and slope at the edge by a unit force of the harmonic, clamped at the bore, without outer moment."""
     unit = jnp.asarray([0.0, 0.0, 0.0, -1.0], rows.dtype)
     return there @ solve_dense(rows, unit)

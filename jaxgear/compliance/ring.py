@@ -59,7 +59,7 @@ def arc_compliance(
 
 
 def relaxation(half_angle: Scalar) -> Float[Array, "3 3"]:
-    """What the self compliance loses because the root traction is not what the load modes assume.
+    """Reduction of the self compliance, as the true root traction differs from that of the load modes.
 
     By the principle of least complementary energy a prescribed traction overstates the compliance. Towards a rigid
     tooth the traction turns into that of a bonded punch, p ~ (1 - y^2)^(-1/2), whose energy on the half plane is lower

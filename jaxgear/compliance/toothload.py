@@ -1,4 +1,4 @@
-"""Where the load line crosses a tooth: the quantities that every compliance model needs."""
+"""Load line of a contact on a tooth: the quantities that every compliance model needs."""
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -15,12 +15,11 @@ class ToothLoad(Checked):
 
     Attributes:
         outline: the tooth.
-        roll_length: of the loaded point [mm].
-        angle: between the load line and the normal to the tooth centreline [rad].
+        roll_length: roll length of the loaded point [mm].
+        angle: angle between the load line and the normal to the tooth centreline [rad].
         height: y of the crossing of load line and centreline [mm].
         depth: distance from the loaded point to that crossing along the load line [mm].
-        normal: of a helical gear the load on the tooth of its virtual gear, at the same height of the tooth; None of a
-            spur gear.
+        normal: load on the tooth of the virtual gear at the same height of the tooth; None for a spur gear.
     """
 
     outline: Outline
@@ -36,7 +35,7 @@ def tooth_load(outline: Outline, roll_length: Real) -> ToothLoad:
 
     Args:
         outline: the tooth.
-        roll_length: of the loaded points [mm].
+        roll_length: roll lengths of the loaded points [mm].
     """
     drawn = outline.curves.over(roll_length.shape)
     angle = jnp.arctan(roll_length / drawn.base_radius) - drawn.half_angle(roll_length)  # as `load_angle`

@@ -1,4 +1,4 @@
-"""What the contacts see of a modification around a place on the flank: its mean, slope and curvature."""
+"""Mean, slope and curvature of a modification over the width of a contact."""
 
 from collections.abc import Sequence
 from functools import partial, reduce
@@ -36,7 +36,8 @@ class PlaceSide(NamedTuple):
     """One gear's side of the contacts: numbers of shape (1, 1, 1), roll length of (pairs, 1 or slices, positions).
 
     Attributes:
-        rate: of the roll length over the way along the flank towards the pinion tip; negative on the wheel.
+        rate: derivative of the roll length by the arc length along the flank towards the pinion tip; negative on the
+            wheel.
     """
 
     rate: Real
@@ -49,16 +50,15 @@ class PlaceSide(NamedTuple):
 
 
 class Place(NamedTuple):
-    """Where the contacts are and how far they may slide [mm], positive towards the pinion tip; (pairs, 1 or
-    slices, positions).
-
-    The half width may differ from slice to slice.
+    """Nominal contacts, their widths and sliding ranges along the flank [mm], positive towards the pinion tip; shape
+    (pairs, 1 or slices, positions).
 
     Attributes:
         radius: relative radius of curvature.
-        half_width: of the contact.
-        beyond: of the virtual centre of the contact beyond the corner that touches; zero on the path.
-        lowest, highest: how far the contact may slide.
+        half_width: half width of the contact; it may differ from slice to slice.
+        beyond: distance of the virtual centre of the contact beyond the corner that touches; zero on the path.
+        lowest, highest: limits of the shift of the contact.
+        sides: pinion's and wheel's side.
     """
 
     radius: Real
@@ -70,7 +70,7 @@ class Place(NamedTuple):
 
 
 def place_of(mesh: Mesh, torque: Scalar, line_load: Real | None = None) -> Place:
-    """Where the contacts of a mesh are; as wide as their line loads make them [N/mm], where these are given."""
+    """Nominal contacts of a mesh, as wide as the line loads [N/mm] make them; by default `usual_load`."""
     first, second = mesh.sides
     radius = over_slices(reduced_radius(first.contact_roll_length, second.contact_roll_length))
     outside, path, contact = mesh.kinematics.contact_outside, mesh.kinematics.contact_path, mesh.path_of_contact
@@ -182,7 +182,7 @@ class Probe(NamedTuple):
 
 
 def probe(sided_terms: Sequence[Sided], place: Place, moved: Real, nodes: tuple[Node, ...]) -> Probe:
-    """What a contact sees that has moved from its nominal place [mm]; no point of it passes a corner."""
+    """Modification over the width of a contact moved from its nominal place [mm]; no point of it passes a corner."""
     span = place.half_width, place.lowest, place.highest
     seen = [_seen(term, moved, place.sides[side], span, nodes) for side, term in sided_terms]
     return jax.tree.map(lambda *parts: reduce(add, parts), *seen)

@@ -46,8 +46,8 @@ def _contained(pair: GearPair, deflection: float | None) -> float:
 def pairs_alternate(pair: GearPair, resolution: Resolution, deflection: float | None) -> bool:
     """Whether at most one of the even and one of the odd pairs can touch in any one slice of helical gears.
 
-    Those are the two pairs within a base pitch of the pitch point, as of a spur pair. Whoever carries along more pairs
-    than the deflection needs gets all of them.
+    The two are the pairs within a base pitch of the pitch point, as of a spur pair. False for a resolution with more
+    pairs than the deflection needs: all of them can touch then.
     """
     if pair.is_spur or not resolution.is_coupled or _is_traced(pair):
         return False
@@ -108,7 +108,7 @@ def _covering(farthest: Any) -> Any:
 
 
 def _half_overlap(pair: GearPair) -> Float[Array, ""]:
-    """By how much the end of the face is ahead of its middle on the path of contact [mm]."""
+    """Distance on the path of contact between the end of the face and its middle [mm]."""
     return 0.5 * pair.face_width * jnp.abs(pair.path_slope)
 
 

@@ -145,7 +145,7 @@ def coupling_of(
 
 
 def _tilt(moving: Kinematics, slopes: Float[Array, "gears"]) -> Float[Array, "slices slices"]:
-    """What the slope of helical bodies adds to the deflection at one place of the face under a force at another [um/N].
+    """Deflection that the slope of helical bodies adds at one place of the face under a force at another [um/N].
 
     Contacts at y from the middle of a body move by y times the slope along the radius, sin(alpha_wt) of which counts on
     the line of action, where the axial force is tan(beta_b) times that along it; and the other way round. The axial
@@ -160,7 +160,7 @@ def _tilt(moving: Kinematics, slopes: Float[Array, "gears"]) -> Float[Array, "sl
 
 
 def _polynomials(sizes: Resolution) -> Float[np.ndarray, "slices bends"]:
-    """Of degree 0, 1, 2, ... at the middles of the slices, as many as modes, orthonormal with the weights of these."""
+    """Polynomials of degree 0, 1, ... at the middles of the slices, one per mode, orthonormal by the slice weights."""
     edges, count = sizes.slice_edges, min(sizes.face_modes, sizes.slices)
     root = np.ones(sizes.slices) if sizes.slice_weights is None else np.sqrt(sizes.slice_weights)
     powers = np.polynomial.legendre.legvander(edges[1:] + edges[:-1], count - 1)

@@ -1,4 +1,4 @@
-"""Where the teeth touch over one base pitch: positions of the pairs, both gears' sides of every contact, tip corners.
+"""Contacts over one base pitch: positions of the tooth pairs, both gears' sides of every contact, tip corners.
 
 A pair that is a distance x outside the path of contact touches with the tip corner of one gear on the flank of the
 other. With the corner's gear in its nominal position, the gap is the arc of the mate's base circle by which the mate
@@ -89,7 +89,7 @@ class Side(Checked):
         contact_roll_length: roll length of every contact [mm], shape (pairs, positions); of helical gears (pairs,
             slices, positions).
         face_middle: middle of the common face of the pair, from the middle of the gear's own face [mm].
-        common_width: of that face, over which both gears overlap [mm].
+        common_width: width of the common face, over which both gears overlap [mm].
     """
 
     gear: Gear
@@ -101,12 +101,12 @@ class Side(Checked):
 
     @property
     def base_radius(self) -> Float[Array, "*cycles"]:
-        """[mm]"""
+        """Base radius of the gear [mm]."""
         return self.gear.base_radius
 
     @property
     def face_width(self) -> Float[Array, "*cycles"]:
-        """Of the gear [mm]."""
+        """Face width of the gear [mm]."""
         return self.gear.face_width
 
     @property
@@ -226,7 +226,7 @@ class Kinematics(Checked):
 
     @property
     def explicit(self) -> "Kinematics":
-        """The same of the pair with its diameters as numbers, for programs that serve gears with and without them."""
+        """Kinematics of the pair with all diameters as numbers, for programs that serve gears with and without them."""
         return changed(self, pair=explicit(self.pair))
 
     @property
@@ -241,7 +241,7 @@ class Kinematics(Checked):
     @property
     @over_batch
     def slice_width(self) -> Float[Array, " slices"]:
-        """[mm], shape (slices,)."""
+        """Width of every slice [mm], shape (slices,)."""
         slices = self.resolution.slices
         if self.resolution.parts is None:
             return jnp.full((slices,), 1.0 / slices, self._dtype) * self.pair.face_width

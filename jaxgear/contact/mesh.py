@@ -70,30 +70,31 @@ class Mesh(eqx.Module):
         compliance: the compliance model.
         sides: both gears' sides of every contact.
         corner_gap: gap of the unmodified flanks outside the path of contact [um], shape (pairs, positions).
-        lever: what a pair closes per unit of transmission error; 1 on the path of contact, less beyond it, because the
+        lever: closing of a pair per unit of transmission error; 1 on the path of contact, less beyond it, because the
             corner's gap opens while the gears turn on.
-        margins: how far the pair is from what cannot run; of traced gears, nothing else tells.
+        margins: distances of the pair from gears that cannot run; the only sign of it where the gears are traced.
         outer_gap: transmission error at which the pairs behind and ahead of those carried along touch if they are not
             modified [um], shape (2, positions).
-        outer_lever: their lever, shape (2, positions).
-        outer_steps: by how much farther they touch the mates than the pairs at the edge do, over what those there move
-            on within one position, shape (2, positions).
+        outer_lever: lever of these outer pairs, shape (2, positions).
+        outer_steps: distance of the contacts of the outer pairs from those of the first and last pair, in steps of the
+            latter from one position to the next, shape (2, positions).
         structure: compliance of both gears under a load that is uniform over the common face, the mean over that face,
             (pairs, pairs, positions) [um per N/mm]; of helical gears whose slices are not coupled that of every slice.
         law: prepared contact law.
         width_factor: squared half width of the contact per line load [mm^2 per N/mm].
         hub: common wind-up of the gear bodies, each over its own face, under a line load over the common one [um per
             N/mm].
-        slice_width: [mm], shape (slices,).
-        coupling: how the slices are elastically coupled; None where they do not.
+        slice_width: width of the slices [mm], shape (slices,).
+        coupling: elastic coupling of the slices; None where they are not coupled.
         support: shafts, bearings and housing; None for rigid, parallel shafts.
-        support_gap: by which it opens the flanks without the force of this mesh [um], shape (slices,); None without.
-        support_torque: at which the support holds [N m]; None where it does at every torque.
-        support_status: whether such a support is possible; None without.
-        automatic: whether the number of pairs was left to `prepare`: `solve` takes more where they are too few.
-        even: whether neither gear is known to help beyond the common face: both end together, or the model is one of
+        support_gap: gap between the flanks by the support without the force of this mesh [um], shape (slices,); None
+            without a support.
+        support_torque: torque at which the support holds [N m]; None where it does at every torque.
+        support_status: whether the support is possible; None without a support.
+        automatic: True if the number of pairs was left to `prepare`: `solve` takes more where they are too few.
+        even: True if neither gear is known to help beyond the common face: both end together, or the model is one of
             two dimensions.
-        alternates: whether at most one of the even and one of the odd pairs can touch in any slice, see
+        alternates: True if at most one of the even and one of the odd pairs can touch in any slice, see
             `pairs_alternate`: slices of helical gears then have two springs each, however many pairs touch over the
             face.
     """
@@ -355,7 +356,7 @@ def _steps(
 
 
 class Sizes(TypedDict, total=False):
-    """Of arrays, in place of those of a mesh."""
+    """Array sizes that `resized` may change."""
 
     positions: int
     slices: int
@@ -372,12 +373,12 @@ def resized(mesh: Mesh, **sizes: Unpack[Sizes]) -> Mesh:
 
 
 def half_way(mesh: Mesh) -> Mesh:
-    """The same mesh half a position later: both together have twice the positions."""
+    """The mesh at positions half a step later: both meshes together have twice the positions."""
     return later(mesh, 0.5)
 
 
 def later(mesh: Mesh, share: float) -> Mesh:
-    """The same mesh a share of a position later."""
+    """The mesh at positions later by a share of the step between two."""
     first = np.asarray(mesh.kinematics.first_phase) + share / mesh.resolution.positions
     moved = prepare_from(first, mesh.pair, mesh.compliance, mesh.resolution, mesh.support, mesh.even)
     return replace(moved, automatic=mesh.automatic, alternates=mesh.alternates)

@@ -1,4 +1,4 @@
-"""What a mesh is run at: torque, speed and friction."""
+"""Operating point of a mesh: torque, speed and friction."""
 
 import jax
 import numpy as np
@@ -13,9 +13,9 @@ class OperatingPoint(Checked):
     """Load and speed of a mesh; many are made with `jax.vmap`.
 
     Attributes:
-        torque: on the pinion [N m].
-        speed: of the pinion [rpm]; None where no result depends on it.
-        friction: mean coefficient of friction; None for the default of whatever needs it.
+        torque: torque on the pinion [N m].
+        speed: speed of the pinion [rpm]; None where no result depends on it.
+        friction: mean coefficient of friction; None for the default of each analysis.
 
     Raises:
         ValueError: for a negative or non-finite number, or an array of numbers.

@@ -126,7 +126,7 @@ class Resolution(Checked):
 
     @property
     def of_arrays(self) -> "Resolution":
-        """What the arrays of a prepared mesh depend on, all else at its default: one program makes them for many."""
+        """Sizes that the arrays of a prepared mesh depend on, all else at its default: one program serves many."""
         plain = self._plain(slice_widths=self.parts, extended_contact=self.extended_contact)
         if self.slices == 1:
             return plain
@@ -135,18 +135,18 @@ class Resolution(Checked):
 
     @property
     def of_material(self) -> "Resolution":
-        """What the material depends on that is removed from the flanks of a prepared mesh, likewise."""
+        """Sizes that the material removed from the flanks of a prepared mesh depends on, all else at its default."""
         nodes, steps = self.contact_nodes, self.chosen_slide_steps
         return self._plain(contact_nodes=nodes, slide_steps=steps, slice_widths=self.parts)
 
     @property
     def of_contact(self) -> "Resolution":
-        """What the contact of a prepared mesh depends on once that material is known, likewise."""
+        """Sizes that the contact depends on once the removed material is known, all else at its default."""
         steps, rtol = self.newton_steps, self.rtol
         return self._plain(newton_steps=steps, rtol=rtol)
 
     def _plain(self, **sizes: object) -> "Resolution":
-        """All else at its default; unchecked, since a mesh at a single position has fewer than anybody may ask for."""
+        """These positions, slices and pairs, all else at its default; unchecked, as a single position is allowed."""
         return changed(Resolution(), positions=self.positions, slices=self.slices, pairs=self.pairs, **sizes)
 
     @property

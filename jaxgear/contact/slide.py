@@ -62,9 +62,9 @@ class RemovedMaterial(Checked):
     """Material removed from both flanks as the contacts meet it; adding a field adds to the amount.
 
     Attributes:
-        amount: by which the gap is wider than that of the unmodified flanks [um], shape (pairs, slices, positions).
-        shift: of the centre of contact along the flanks, positive towards the pinion tip [mm], shape (pairs, slices or
-            1, positions).
+        amount: gap minus that of the unmodified flanks [um], shape (pairs, slices, positions).
+        shift: shift of the centre of contact along the flanks, positive towards the pinion tip [mm], shape (pairs,
+            slices or 1, positions).
         relative_curvature: curvature that the removed material adds, times the relative radius of the flanks; of the
             same shape.
     """
@@ -80,7 +80,7 @@ class RemovedMaterial(Checked):
 
 
 def nothing_removed(sizes: Resolution, dtype: np.dtype) -> RemovedMaterial:
-    """That of nominal involutes."""
+    """Removed material of nominal involutes: zero."""
     return as_removed(sizes, np.zeros((sizes.chosen_pairs, sizes.slices, sizes.positions), dtype))
 
 
@@ -113,7 +113,7 @@ def slid_material(
     line_load: Load | None = None,
     own: Own | None = None,
 ) -> RemovedMaterial:
-    """What the contacts meet of the modifications; its arguments in the precision of the mesh.
+    """Removed material at the resting contacts; the arguments are in the precision of the mesh.
 
     The contacts are as wide as their line loads make them [N/mm]; by default as those of unmodified flanks.
     `own` are further modifications of pinion and wheel, every array of which has one entry per pair in front.
@@ -160,7 +160,7 @@ def _slide(sided_terms: Sequence[Sided], place: Place, nodes: tuple[Node, ...], 
 
 
 def _met(shift: Real, sided_terms: Sequence[Sided], place: Place, nodes: tuple[Node, ...]) -> tuple[Real, Real, Real]:
-    """What a contact with a shift [mm] meets: amount [um] and relative curvature; and by how much it misses rest [mm].
+    """Amount [um] and relative curvature at a contact with a shift [mm], and its residual of the rest condition [mm].
 
     At rest the slope of bulge and removed material together is zero.
     """
@@ -208,9 +208,9 @@ def loaded_material(
 
     Args:
         mesh: prepared mesh.
-        torque: on the pinion [N m].
+        torque: torque on the pinion [N m].
         pinion, wheel: modifications.
-        first_contact: line loads [N/mm] and residual of the contact on material that has been removed.
+        first_contact: function that gives line loads [N/mm] and residual of the contact for a removed material.
         own: further modifications of every pair, see `slid_material`.
     """
     if own is None and isinstance(pinion, NoModification) and isinstance(wheel, NoModification):

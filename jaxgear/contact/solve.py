@@ -193,10 +193,10 @@ def begin_contact(
     resolution: Resolution,
     support: AbstractSupport | None = None,
 ) -> None:
-    """Starts to compile what prepares a pair and solves its contact, where programs are kept; gives nothing.
+    """Start to compile the programs that prepare a pair and solve its contact, where programs are kept.
 
-    Who knows that this will be needed, and has something else to do until then, calls it. What prepares the pair at the
-    array sizes that are needed `first` goes ahead.
+    Call this early to overlap compilation with other work. The program that prepares the pair at the array sizes
+    `first` is compiled before the others.
     """
     even = ends_together(pair, compliance)
     begin_mesh(pair, compliance, first, support, even)
@@ -238,7 +238,7 @@ def flanks_of(
 
 
 def _cycle(mesh: Mesh, operating_point: OperatingPoint, contact: dict[str, Any], pinion=None, wheel=None) -> MeshCycle:
-    """What the compiled programs leave out: it passes through them unchanged, and would be copied."""
+    """Mesh cycle of a contact; the inputs do not pass through the compiled programs, which would copy them."""
     return MeshCycle(
         kinematics=mesh.kinematics,
         margins=mesh.margins,
@@ -413,7 +413,7 @@ def outermost(mesh: Mesh, removed: RemovedMaterial) -> Curve:
 
 
 def _sliding_gain(mesh: Mesh, shift) -> Float[Array, "2 slices"]:
-    """By how much a slope lets the gap fall at the edges of the window, R s^2 / 2, the larger of two positions [um]."""
+    """Fall of the gap by a slope at the edges of the base pitch, R s^2 / 2, the larger of two positions [um]."""
     ends = [(-1, slice(None, 2)), (0, slice(-2, None))]
     rolls = [[over_slices(side.contact_roll_length)[pair, :, places] for side in mesh.sides] for pair, places in ends]
     gains = [500 * shift[pair, :, places] ** 2 / reduced_radius(*both) for (pair, places), both in zip(ends, rolls)]

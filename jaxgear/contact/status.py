@@ -66,7 +66,7 @@ class WithStatus:
 
     @property
     def converged(self) -> Any:
-        """Where the status is `Status.CONVERGED`, bools of its shape."""
+        """Whether the status is `Status.CONVERGED`, bools of the shape of the status."""
         return self.status == Status.CONVERGED.value
 
 

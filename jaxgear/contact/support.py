@@ -1,4 +1,4 @@
-"""What a contact analysis needs to know of shafts, bearings and housing."""
+"""Interface of shafts, bearings and housing to the contact analysis."""
 
 from abc import abstractmethod
 
@@ -13,7 +13,7 @@ Scalar = Float[Array, ""]
 
 
 class AbstractSupport(Checked):
-    """How the flanks of a mesh come apart along the line of action, over the face coordinate y."""
+    """Gap between the flanks along the line of action by the deflection of shafts, bearings and housing."""
 
     @property
     @abstractmethod
@@ -22,12 +22,12 @@ class AbstractSupport(Checked):
 
     @property
     def torque(self) -> Scalar | None:
-        """On the pinion [N m], where influence and gap belong to one; None where they hold at every torque."""
+        """Pinion torque at which influence and gap hold [N m]; None where they hold at every torque."""
         return None
 
     @property
     def needs_even_slices(self) -> bool:
-        """Whether it is known over slices of equal width alone."""
+        """Whether the support is known over slices of equal width alone."""
         return False
 
     @property
@@ -46,4 +46,4 @@ class AbstractSupport(Checked):
 
     @abstractmethod
     def gap(self, y: Slices) -> Slices:
-        """Gap by everything else than the force of this mesh [um]."""
+        """Gap at y by everything else than the force of this mesh [um]."""

@@ -22,14 +22,14 @@ class Cutter(NamedTuple):
     """A cutter and its mesh with the gear that it cuts.
 
     Attributes:
-        tangent: of the generating pressure angle alpha_w0, with
+        tangent: tan(alpha_w0) of the generating pressure angle, with
             inv(alpha_w0) = inv(alpha) + 2 tan(alpha) (x_E + x_0) / (z + z_0).
-        gear_pitch_radius, pitch_radius: on which gear and cutter roll, r_w and r_w0 [mm].
-        gear_base_radius, base_radius: r_b and r_b0 [mm].
-        tip_radius: r_a0 = m (z_0 / 2 + x_0 + h_a0) [mm].
+        gear_pitch_radius, pitch_radius: generating pitch radii r_w of the gear and r_w0 of the cutter [mm].
+        gear_base_radius, base_radius: base radii r_b and r_b0 [mm].
+        tip_radius: tip radius of the cutter r_a0 = m (z_0 / 2 + x_0 + h_a0) [mm].
         rounding: radius rho_a0 of its tip's rounding [mm].
-        center_radius: c_0 = r_a0 - rho_a0, of the rounding's centre [mm].
-        gap_angle: from the middle of the cutter's space to the centre of the rounding, seen from its axis [rad]. The
+        center_radius: radius c_0 = r_a0 - rho_a0 of the rounding's centre [mm].
+        gap_angle: angle at the cutter's axis from the middle of its space to the centre of the rounding [rad]. The
             centre lies on the involute that is parallel to the flank, at the distance rho_a0 inside of the tooth.
         pitch_angle: half a pitch of the cutter [rad]: what `gap_angle` may be at most.
     """
@@ -52,12 +52,12 @@ class Cutter(NamedTuple):
 
     @property
     def root_circle_radius(self) -> Number:
-        """r_f = a_0 - r_a0, of the gear [mm]."""
+        """Root circle radius of the gear, r_f = a_0 - r_a0 [mm]."""
         return self.center_distance - self.tip_radius
 
     @property
     def depth(self) -> Number:
-        """Of the rounding's centre below the cutter's pitch circle [mm]."""
+        """Depth of the rounding's centre, c_0 - r_w0, positive outside the cutter's pitch circle [mm]."""
         return self.center_radius - self.pitch_radius
 
     @property
@@ -82,7 +82,7 @@ class Cutter(NamedTuple):
 
     @property
     def tip_half_width(self) -> Number:
-        """Of the tip between its roundings, as an arc through their centres [mm]; 0 for one arc over the whole tip."""
+        """Half the tip width between its roundings, as an arc through their centres [mm]; 0 for a tip of one arc."""
         return self.center_radius * (self.pitch_angle - self.gap_angle)
 
 
@@ -157,7 +157,7 @@ def full_rounding(cutter_teeth: Number, pressure_angle: Number, cutter_shift: Nu
 def cutter_contact(
     g: Number, pitch_radius: Number, cutter_radius: Number, offset: Number, depth: Number
 ) -> tuple[Number, Number]:
-    """Where the arc at the cutter's tip touches the fillet, on a common normal of the inclination g.
+    """Contact of the arc at the cutter's tip with the fillet, on a common normal of the inclination g.
 
     L = -r_w0 sin(g) + sqrt(c_0^2 - r_w0^2 cos(g)^2), written without a difference (depth / sin(g) of a rack), and
     phi = (r_w0 theta + offset) / r_w with theta = atan2(L cos(g), r_w0 + L sin(g)). The inclination of the fillet's

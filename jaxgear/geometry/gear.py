@@ -273,10 +273,10 @@ class Gear(Checked):
 
     @property
     def cutter_room(self) -> Real | None:
-        """What is left for the cutter [mm]: the smallest of four lengths that are not negative where it can be used.
+        """Smallest of four lengths [mm], none of them negative if the cutter can be used; None without a cutter.
 
         The radius of the roundings of its tip, half the width between them, the height of their centres above its base
-        circle, and the roll length beyond the gear's tip form circle that its involute reaches. None without a cutter.
+        circle, and the roll length beyond the gear's tip form circle that its involute reaches.
         """
         cutter = _cutter(self)
         if cutter is None:
@@ -288,12 +288,12 @@ class Gear(Checked):
 
     @property
     def thickness_angle(self) -> Real:
-        """What the mean tooth thickness allowance adds to half the angle of the tooth [rad]."""
+        """Change of half the tooth angle by the mean tooth thickness allowance [rad]."""
         return 1e-3 * self.mean_tooth_thickness_allowance / (2 * self.pitch_radius * self.helix_cosine)
 
     @property
     def tip_form_radius(self) -> Real:
-        """Where the active flank ends [mm]: at the tip circle, or where its chamfer or rounding begins."""
+        """Tip form radius r_Fa, where the active flank ends [mm]: at the tip circle, its chamfer or its rounding."""
         return self.tip_radius if self.tip_form_diameter is None else 0.5 * self.tip_form_diameter
 
     @property
@@ -384,7 +384,7 @@ def _cutter(gear: Gear) -> Cutter | None:  # of JAX's or of NumPy's numbers, lik
 
 
 def tool_name(gear: Gear) -> str:
-    """What generates the gear: "rack" or "cutter"."""
+    """Name of the tool that generates the gear: "rack" or "cutter"."""
     return "rack" if gear.cutter_teeth is None else "cutter"
 
 
@@ -449,7 +449,7 @@ def shape_faults(gear: Gear) -> tuple[str, ...]:
         faults.append(f"Gear: tip_form_diameter = {form:g} mm must be greater than {max(base, root):g} mm")
     elif land > 0 and not left > -CHAMFER_ACCURACY:
         faults.append(
-            f"Gear: tip_form_diameter = {form:.6g} mm leaves no tip land: chamfers of 45 degrees are there "
+            f"Gear: tip_form_diameter = {form:.6g} mm leaves no tip land: chamfers of 45 degrees would be "
             f"{chamfer:.4g} mm high and meet below the tip diameter, {tip:.6g} mm"
         )
     if height > 0:
@@ -503,7 +503,7 @@ def _tool_radius_limit(gear: Gear) -> float | None:
 
 
 def _tool(gear: Gear) -> tuple[Any, ...]:
-    """What the full radius depends on: pressure angle, dedendum, teeth and shift of the cutter."""
+    """Arguments of `_full_radius`: pressure angle, dedendum; of a cutter also its tooth number and profile shift."""
     if gear.cutter_teeth is None:
         return gear.pressure_angle, gear.dedendum
     return gear.pressure_angle, gear.dedendum, gear.cutter_teeth, gear.cutter_profile_shift

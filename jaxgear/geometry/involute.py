@@ -16,7 +16,7 @@ Scalar = Float[Array, ""]
 
 
 class Toothed(Protocol):
-    """What the relations need to know of a gear; meanings as in `Gear`."""
+    """Properties of a gear that the involute relations use; meanings as in `Gear`."""
 
     @property
     def teeth(self) -> Scalar: ...

@@ -28,11 +28,11 @@ _LEAST_DECIMALS = 2  # that drawings give
 
 
 class Accuracy(eqx.Module):
-    """By how much a margin may lie below zero: what an outline, or single precision, does not resolve.
+    """Accuracy of some margins, by which they may lie below zero: that of an outline, or of single precision.
 
     Attributes:
-        pinion_form, wheel_form: roll length that the accuracy of the outline is worth at the form circle [mm].
-        backlash: [um].
+        pinion_form, wheel_form: roll length of the outline's accuracy at the form circle [mm].
+        backlash: accuracy of the backlash [um].
     """
 
     pinion_form: Scalar

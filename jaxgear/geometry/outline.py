@@ -35,21 +35,21 @@ _CLIMB, _ALONG_PROTUBERANCE = 10.0, 1e-3
 
 
 class Curves(NamedTuple):
-    """The numbers that trochoid and involute of one gear are drawn by.
+    """Numbers that define trochoid and involute of one gear.
 
     They are evaluated once and given the shape of all points (`over`): a derivative then sums over the points once for
     each of these numbers, instead of wherever a number meets a point, and each sum is a loop to compile.
 
     Attributes:
-        pitch_radius: on which the gear rolls with its tool [mm].
-        base_radius: [mm].
+        pitch_radius: generating pitch radius of the gear [mm].
+        base_radius: base radius [mm].
         base_half_angle: half tooth angle on the base circle [rad].
-        tip_roll_length: where the involute ends [mm].
+        tip_roll_length: roll length where the involute ends [mm].
         offset, depth, rounding: `rack_tip` [mm].
         stretch: 1 / cos(beta), length of the transverse rack over that of the normal one; None of a spur gear.
         lean: inclination of the flank of the tool's protuberance [rad]; None without protuberance.
         climb: depth along that flank over g [mm/rad]; likewise.
-        cutter_radius: on which a cutter rolls with the gear [mm]; None of a rack.
+        cutter_radius: generating pitch radius of the cutter [mm]; None for a rack.
     """
 
     pitch_radius: Real
@@ -65,7 +65,7 @@ class Curves(NamedTuple):
     cutter_radius: Real | None = None
 
     def over(self, shape: tuple[int, ...]) -> "Curves":
-        """The same numbers at every point of an array."""
+        """Curves with all numbers broadcast to the shape of the points."""
         drawn: Curves = jax.tree.map(lambda number: jnp.broadcast_to(number, shape), self)
         return drawn
 
@@ -104,7 +104,7 @@ class Outline(Checked):
 
     Attributes:
         gear: the gear.
-        curves: what fillet and involute are drawn by.
+        curves: numbers that define fillet and involute.
         junction: trochoid parameter where fillet and involute meet [rad].
         form_roll_length: roll length there [mm], the start of the usable involute (ISO 21771 d_Ff).
         root_half_angle: half angle subtended by the tooth at the root circle, theta_f [rad].

@@ -95,7 +95,7 @@ class GearPair(Checked):
 
     @property
     def face_overlap(self) -> Real:
-        """What the faces share along the axis [mm]; negative where they are apart."""
+        """Axial length on which both faces overlap [mm]; negative where they are apart."""
         low, high = self._common_face
         return high - low
 
@@ -108,7 +108,7 @@ class GearPair(Checked):
 
     @property
     def overhangs(self) -> tuple[tuple[Real, Real], tuple[Real, Real]]:
-        """By how much pinion and wheel are wider than the common face, at its negative and its positive end [mm]."""
+        """Overhangs of pinion and wheel beyond the common face, at its negative and its positive end [mm]."""
         half = 0.5 * self.face_width
 
         def ends(gear: Gear, middle: Real) -> tuple[Real, Real]:
@@ -126,7 +126,7 @@ class GearPair(Checked):
 
     @property
     def _common_face(self) -> tuple[Real, Real]:
-        """Its ends from the middle of the pinion's face [mm]."""
+        """Ends of the common face from the middle of the pinion's face [mm]."""
         pinion, wheel, offset = 0.5 * self.pinion.face_width, 0.5 * self.wheel.face_width, self.axial_offset
         return jnp.maximum(-pinion, offset - wheel), jnp.minimum(pinion, offset + wheel)
 

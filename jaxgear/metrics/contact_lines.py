@@ -1,4 +1,4 @@
-"""What contact lines that run obliquely over the face bring: their length, axial force, tilting and shuttling moments.
+"""Quantities of oblique contact lines: their length, axial force, tilting and shuttling moments.
 
 References:
     ISO 21771 for the ratios; the lengths are those of ISO 6336-2 and of G. Niemann, H. Winter, Maschinenelemente II.

@@ -1,4 +1,4 @@
-"""What excites vibration: variation of the transmission error, mesh stiffness, and the force that goes with both."""
+"""Excitation of vibration: variation of the transmission error, mesh stiffness, and the force of both."""
 
 from functools import partial
 from typing import TypeVar
@@ -117,7 +117,7 @@ def force_excitation(cycle: MeshCycle) -> Curve:
 
 
 def excited_by(error: Curves, stiffness: Curves) -> Curves:
-    """The same of a transmission error [um] and mesh stiffness [N/um] at the same positions, in NumPy or JAX."""
+    """Force excitation [N] of a transmission error [um] and mesh stiffness [N/um] at the same positions."""
     return stiffness * (error - error.mean())
 
 

@@ -25,7 +25,7 @@ from .stress import nominal_root_stress
 
 
 def _of_field(cls: type[eqx.Module], name: str) -> Usual:
-    """What a class says is usual of its field."""
+    """Usual range that a class declares for its field."""
     usual = fields_of(cls)[name].usual
     assert usual is not None
     return usual
@@ -127,7 +127,7 @@ def of_limits(
 
 
 def unusual(findings: Iterable[Finding]) -> tuple[Finding, ...]:
-    """Those whose number is out of its usual range."""
+    """The findings whose number is out of its usual range."""
     return tuple(finding for finding in findings if finding.is_unusual)
 
 
@@ -146,20 +146,20 @@ def findings_of(
     verified: float | None = None,
     support_deflection: float = 0.0,
 ) -> tuple[Finding, ...]:
-    """What of a solved design is not usual; empty where nothing is.
+    """Findings about a solved design: numbers out of their usual range; empty if there are none.
 
     Args:
-        cycle: solved, one design and one torque, not traced.
+        cycle: solved cycle of one design at one torque, not traced.
         pinion, wheel: modifications; None for those of the cycle.
         torque_range: lowest and highest torque of interest [N m].
-        speed: of the pinion [rpm]; None for that of the cycle.
+        speed: speed of the pinion [rpm]; None for that of the cycle.
         friction: coefficient of friction; None for that of the cycle.
         oil_friction: coefficient of friction that a law gives; None without a lubricant.
-        bulk_temperature: of the teeth [degC]; None without a lubricant.
+        bulk_temperature: bulk temperature of the teeth [degC]; None without a lubricant.
         lubricant: the oil; None without one.
-        compliance: by which it was solved, which the cycle does not tell; None for one that is composed of models.
-        verified: PPTE of the same design by the finite-element structure, where it is known [um].
-        support_deflection: mean transmission error that is that of shafts, bearings and housing, not of the teeth [um].
+        compliance: compliance that the cycle was solved with; None for one that is composed of models.
+        verified: PPTE of the same design by the finite-element structure [um]; None if not known.
+        support_deflection: part of the mean transmission error by shafts, bearings and housing [um].
     """
     flanks = tuple(given or own or NoModification() for given, own in ((pinion, cycle.pinion), (wheel, cycle.wheel)))
     rpm = cycle.operating_point.speed if speed is None else speed

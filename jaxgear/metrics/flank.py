@@ -1,4 +1,4 @@
-"""What a modification asks of the grinding machine: amounts, monotony and volume of the material removed.
+"""Demands of a modification on the grinding machine: amounts, monotony and volume of the material removed.
 
 All functions take a prepared mesh, or the `Kinematics` that a mesh and its cycles hold, and the modifications of both
 gears (None for the nominal involute). They look at the active profile, from its start to the tip, and across the common

@@ -88,7 +88,7 @@ def corner_force(cycle: MeshCycle) -> Float[Array, "pairs positions"]:
 
 
 def slice_forces(cycle: MeshCycle) -> Float[Array, "pairs slices positions"]:
-    """What every slice has of `pair_force` [N], as the loads of the slices are."""
+    """Force of every slice [N]: `pair_force`, divided in proportion to the loads of the slices."""
     load = cycle.line_load * cycle.kinematics.slice_width[None, :, None]
     return load * over_slices(safe_divide(cycle.pair_force, jnp.sum(load, axis=1)))
 
@@ -130,8 +130,8 @@ class _Face(NamedTuple):
 
 @over_batch
 def face_load_factors(cycle: MeshCycle) -> Curve:
-    """Of every position, largest over mean line load over the face of the pair with the largest line load there; of
-    helical gears of all pairs together.
+    """Largest over mean line load over the face at every position, of the pair with the largest line load there; of
+    helical gears, of all pairs together.
 
     Raises:
         ValueError: for a cycle of one slice.
@@ -202,7 +202,7 @@ def over_several_slices(factor: Callable[[MeshCycle], Scalar], cycle: MeshCycle)
 
 
 def _at_positions(owner: str, cycle: MeshCycle) -> _Face:
-    """Of every position, the pair with the largest line load, of helical gears all; shape (positions, slices)."""
+    """Load over the face of the pair with the largest line load, of helical gears of all; shape (positions, slices)."""
     _check_slices(owner, cycle)
     of, load = cycle.kinematics, jnp.moveaxis(cycle.line_load, 2, 0)  # positions, pairs, slices
     if of.helical:
@@ -217,7 +217,7 @@ def _check_slices(owner: str, cycle: MeshCycle) -> None:
 
 
 def _worst(owner: str, cycle: MeshCycle) -> _Face:
-    """Of these, that of the position with the largest line load, of helical gears the mean; shape (slices,)."""
+    """`_at_positions` where the line load is largest; of helical gears the mean over the cycle; shape (slices,)."""
     if cycle.kinematics.helical:
         _check_slices(owner, cycle)
         return _over_cycle(cycle)
@@ -227,5 +227,5 @@ def _worst(owner: str, cycle: MeshCycle) -> _Face:
 
 
 def _over_cycle(cycle: MeshCycle) -> _Face:
-    """All pairs together, mean over the cycle; shape (slices,)."""
+    """Load over the face of all pairs together, mean over the cycle; shape (slices,)."""
     return _Face(jnp.mean(jnp.sum(cycle.line_load, axis=0), axis=1), cycle.kinematics.slice_width)

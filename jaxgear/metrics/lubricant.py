@@ -31,10 +31,11 @@ _DENSITY_REFERENCE, _DENSITY_SLOPE = 289.0, 0.7  # K, kg/(m3 K)
 
 
 class BaseOil(NamedTuple):
-    """What follows from the kind of oil.
+    """Constants of a kind of oil.
 
     Attributes:
-        pressure_viscosity, exponent: of alpha_38 = pressure_viscosity * eta_38^exponent [1/Pa], eta_38 in Pa s.
+        pressure_viscosity, exponent: constants of alpha_38 = pressure_viscosity * eta_38^exponent [1/Pa], eta_38 in
+            Pa s.
         friction_factor: X_L of the laws of friction.
     """
 
@@ -109,7 +110,7 @@ class Lubricant(AbstractSettings):
         return jnp.exp(jnp.exp(cold + (hot - cold) * way)) - _WALTHER
 
     def density_at(self, temperature: Given) -> Real:
-        """[kg/m^3] at a temperature [degC], 0.7 kg/m^3 less per kelvin."""
+        """Density [kg/m^3] at a temperature [degC], 0.7 kg/m^3 less per kelvin."""
         at_15 = 43.37 * jnp.log10(self.viscosity_40) + 805.5 if self.density is None else self.density
         return at_15 - _DENSITY_SLOPE * (temperature + _ISO_KELVIN - _DENSITY_REFERENCE)
 
@@ -118,8 +119,9 @@ class Lubricant(AbstractSettings):
         return 1e-6 * self.kinematic_viscosity(temperature) * self.density_at(temperature)
 
     def pressure_viscosity(self, temperature: Given) -> Real:
-        """alpha [1/Pa] at a temperature [degC]: alpha_38 (1 + 516 (1 / T - 1 / 311)), T absolute; from 510 degC on
-        negative: the oil is none any more."""
+        """Pressure-viscosity coefficient [1/Pa] at a temperature [degC]: alpha_38 (1 + 516 (1 / T - 1 / 311)), T in K;
+        negative above 510 degC, beyond the range of any oil.
+        """
         base = BASES[self.base]
         reference = jnp.full_like(self.viscosity_40, _ISO_REFERENCE - _ISO_KELVIN)
         at_38 = base.pressure_viscosity * self.viscosity(reference) ** base.exponent

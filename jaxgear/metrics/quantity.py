@@ -20,10 +20,10 @@ Numbers = Float[Array, "..."]
 
 
 class AbstractSettings(Checked):
-    """What some quantities need besides a mesh cycle: an oil, strengths, what vibrates, how long it runs.
+    """Settings that some quantities need besides a mesh cycle: lubricant, strengths, masses, running time.
 
-    A quantity of settings names their class, and `quantity` gives it with them. A class of your own does as those of
-    the library do:
+    A quantity with settings names their class in `takes`; the method `quantity` of the settings gives the quantity
+    computed with them. A class of your own is defined as those of the library are:
 
         class Microphone(AbstractSettings):
             table = "microphone"
@@ -36,7 +36,7 @@ class AbstractSettings(Checked):
         Microphone(distance=0.5).quantity("level")
 
     Attributes:
-        table: of a design file, whose keys are the fields.
+        table: table of a design file, whose keys are the fields; "" for none.
     """
 
     table: ClassVar[str] = ""
@@ -159,7 +159,7 @@ class Quantity(eqx.Module):
         return self.reduction(self.values(analysis).ravel())
 
     def values(self, analysis: Analysis | MeshCycle) -> Float[Array, "..."]:
-        """What is reduced, of one cycle, in its own shape.
+        """Values of one cycle before the reduction, in their own shape.
 
         Raises:
             ValueError: when it is neither a number nor an array, or an array without a reduction, and where settings
@@ -243,7 +243,7 @@ class Vocabulary(Mapping[str, Quantity]):
 
         Args:
             of: the quantity; a function is taken for a quantity of its own name that gives a single number.
-            owner: who asks, for the message.
+            owner: name of the caller, for the message.
 
         Raises:
             ValueError: for an unknown name, with the nearest known one.

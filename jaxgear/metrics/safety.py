@@ -154,7 +154,7 @@ def scuffing_safety(cycle: MeshCycle, lubricant: Lubricant) -> Load:
 
 
 def strengths_of(owner: str, strength: Strength, name: str) -> tuple[Scalar, Scalar]:
-    """That of pinion and wheel; raises a `ValueError` where there is none."""
+    """Strength `name` of pinion and wheel, the wheel's by default the pinion's; raises a `ValueError` without any."""
     pinion, wheel = given_strength(owner, strength, name), getattr(strength, f"wheel_{name}")
     return pinion, pinion if wheel is None else wheel
 
@@ -199,8 +199,8 @@ def damage_per_cycle(owner: str, strength: Strength, name: Mode, stresses: tuple
     """Damage of pinion and wheel by one load cycle of each, 1 / N of their S-N curves.
 
     Args:
-        owner: who asks, for messages.
-        strength: with the S-N curve.
+        owner: name of the caller, for messages.
+        strength: strengths with the S-N curve.
         name: "pitting" or "bending".
         stresses: nominal stress of pinion and wheel [MPa].
 

@@ -116,7 +116,7 @@ _TANGENT = jnp.pi / 6  # of the critical section, against the centreline [rad]
 _SECTION_STEPS = 8  # fixed-point steps of ISO 6336-3 for theta; it gains two digits per step
 _NOTCH_LIMITS = (1.0, 8.0)  # validity of Y_S in the notch parameter q_s
 _OBLIQUE, _MOST_OBLIQUE = 120.0, 30.0  # deg; Y_beta = 1 - eps_beta beta / 120 deg, beta at most 30 deg
-# Contacts near the root load the section with hardly any lever arm; the formula needs a positive one [x module].
+# Contacts near the root load the section with almost no lever arm; the formula needs a positive one [x module].
 _SHORTEST_ARM = 0.05
 
 
@@ -173,7 +173,7 @@ def critical_section(gear: Gear) -> CriticalSection:
 
 
 def _section_by_cutter(drawn: Curves) -> CriticalSection:
-    """Where the tangent of the fillet has 30 degrees, by a root search.
+    """Root section at the 30 degree tangent of the fillet, by a root search.
 
     The radius of curvature is that of the roulette of the tip arc's centre (Euler and Savary) and of the arc:
     rho_F = rho_a0 + L^2 / (L + sin(g) / (1 / r_w + 1 / r_w0)), where the rack has r_w0 = infinity.

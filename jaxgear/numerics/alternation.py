@@ -1,4 +1,4 @@
-"""Springs of which one of the even and one of the odd ones touch at once, at most: two rows stand for all."""
+"""Springs of which at most one even and one odd one touch at the same time: two rows hold the values of all."""
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -11,18 +11,18 @@ class Alternation(eqx.Module):
     """Which of the springs can touch, in every slice at every position: one of the even and one of the odd ones.
 
     Attributes:
-        chosen: of all springs.
+        chosen: True where a spring can touch.
     """
 
     chosen: Bool[Array, "springs slices positions"]
 
     def rows(self, springs: Float[Array, "springs #slices positions"]) -> Float[Array, "2 slices positions"]:
-        """What the springs have that can touch."""
+        """Values of the springs that can touch (rows: even, odd), selected from the values of all springs."""
         both = [self._chosen(list(springs[first::2]), first) for first in (0, 1)]
         return jnp.stack([jnp.broadcast_to(row, self.chosen.shape[1:]) for row in both])
 
     def springs(self, rows: list[Shaped[Array, "slices positions"]]) -> list[Shaped[Array, "slices positions"]]:
-        """What all springs have, from what those have that can touch: nothing where they cannot."""
+        """Values of all springs from the two rows of those that can touch; zero where a spring cannot touch."""
         none = jnp.zeros_like(rows[0])
         return [
             rows[i % 2] if self.alone(i) else jnp.where(flag, rows[i % 2], none) for i, flag in enumerate(self.chosen)

@@ -1,4 +1,4 @@
-"""What a contact problem is given by and what an iterate tells; `complementarity` states the conditions.
+"""Data and solution of a contact problem, and quantities of an iterate; `complementarity` states the conditions.
 
 The iterate v holds the load of every spring in contact, and of every other one minus the load that would open it as far
 as it is open.
@@ -61,18 +61,18 @@ class ContactProblem(eqx.Module):
         compliance: C, shape (pairs, pairs, positions); or of every slice, (pairs, pairs, slices, positions), where
             slices are not coupled. Where only some of the springs can touch (`SliceCoupling.alternation`) it is that of
             all, and what follows is of these alone.
-        law: h(q) of every spring.
-        gap: shape (pairs, slices, positions).
-        lever: what a spring closes per unit of common approach, positive, shape (pairs, positions) or (pairs, slices,
+        law: deflection h(q) of every spring.
+        gap: gap of every spring without load, shape (pairs, slices, positions).
+        lever: closing of a spring per unit of common approach, positive, shape (pairs, positions) or (pairs, slices,
             positions).
         weight: width of each slice, shape (slices,).
         load: total load, scalar or shape (positions,); None where the approach is prescribed.
         approach: prescribed common approach d, shape (positions,); None where the load is.
-        start_law: a law like h that many problems share, which spares each of them the evaluations that its solution
-            starts from; None for h.
-        coupling: how slices are elastically coupled, whose `weight` then is that of the slices over their mean,
-            None where all have one; None where only the approach is common.
-        known: its solution; None where that is sought.
+        start_law: law that the solution starts from, close to h and shared by many problems, so that it is evaluated
+            once for all of them; None for h.
+        coupling: elastic coupling of the slices, its `weight` being `weight` over the mean of all slices (None for
+            equal weights); None where slices only have the approach in common.
+        known: solution of the problem where it has been found before; None where it is sought.
 
     Raises:
         ValueError: unless one of load and approach is given.
@@ -95,7 +95,7 @@ class ContactProblem(eqx.Module):
 
     @property
     def levers(self) -> Float[Array, "pairs #slices positions"]:
-        """Of every spring, with an axis of slices."""
+        """Levers of the springs, with an axis of slices."""
         return over_slices(self.lever)
 
     @property
@@ -130,7 +130,7 @@ class ContactSolution(eqx.Module):
 
 
 def active_of(problem: ContactProblem, v: Rows) -> list[Bool[Array, "slices positions"]]:
-    """Where the iterate is not negative; if it is everywhere, the largest must bear the load."""
+    """True where the iterate is not negative; where all of it is negative and a load is given, at its largest entry."""
     if problem.load is None:
         return [row >= 0 for row in v]
     floor = jnp.minimum(reduce(jnp.maximum, [jnp.max(row, axis=0) for row in v]), 0.0)

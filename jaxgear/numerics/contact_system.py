@@ -73,14 +73,14 @@ def step(problem: ContactProblem, factors: Factors | CoupledFactors, known: Rows
 def correction(
     problem: ContactProblem, factors: CoupledFactors, known: Rows, left: Rows, missing: Curve | None
 ) -> tuple[Rows, Curve, Rows]:
-    """What a step adds to line loads and approach, and `opening` after it, of coupled slices.
+    """Changes of line loads and approach in a step with coupled slices, and `opening` after the step.
 
     Args:
         problem: the data.
-        factors: of the active springs.
-        known: by which the active springs still overlap.
-        left: `opening` before.
-        missing: load that is still missing; None where the approach is prescribed.
+        factors: factors of the active springs.
+        known: remaining overlap of the active springs.
+        left: `opening` before the step.
+        missing: prescribed load minus the present one; None where the approach is prescribed.
     """
     approach = None if missing is not None else jnp.zeros_like(problem.gap[0, 0])
     found = respond(problem.weight, factors, known, load=missing, approach=approach)
@@ -89,7 +89,7 @@ def correction(
 
 def _left(factors: CoupledFactors, found: Response, gap: Rows) -> Rows:
     held = factors.coupling.held
-    assert held is not None  # whoever eliminates gives the inverses
+    assert held is not None  # set by `with_inverses` before every elimination
     return [
         sum(c * q for c, q in zip(row, found.load)) + start - pressed
         for row, start, pressed in zip(held.local_slices, gap, found.pressed)
@@ -104,12 +104,12 @@ def load_per_approach(problem: ContactProblem, factors: Factors | CoupledFactors
 
 
 def opening(problem: ContactProblem, load: Rows, approach: Curve) -> Rows:
-    """y without the springs' own deflection."""
+    """Remaining gap y of every spring, without its own deflection."""
     return [y + gap for y, gap in zip(without_gap(problem, load, approach), problem.gap)]
 
 
 def without_gap(problem: ContactProblem, load: Rows, approach: Curve) -> Rows:
-    """The same without the gap."""
+    """Part of `opening` that load and approach cause: C q - lever d, without the initial gap."""
     if problem.coupling is not None:
         deflected = problem.coupling.deflection(problem.compliance, problem.lever, load)
         return [row - lever * approach[None] for row, lever in zip(deflected, problem.levers)]
@@ -120,7 +120,7 @@ def without_gap(problem: ContactProblem, load: Rows, approach: Curve) -> Rows:
 
 
 def total(problem: ContactProblem, load: Rows) -> Curve:
-    """The load that line loads make."""
+    """Total load of the line loads, times lever and slice width."""
     if problem.lever.ndim == 3:
         return jnp.sum(problem.weight[:, None] * sum(lever * q for lever, q in zip(problem.lever, load)), axis=0)
     return sum(lever * jnp.sum(problem.weight[:, None] * q, axis=0) for lever, q in zip(problem.lever, load))

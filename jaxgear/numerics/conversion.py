@@ -1,4 +1,4 @@
-"""What callers give: numbers as JAX takes them, and as text; arrays that no optimizer takes for parameters."""
+"""Conversion of given values: numbers to JAX arrays and to text; arrays that no optimizer takes for parameters."""
 
 from collections.abc import Sequence
 from typing import Any, Generic, Protocol, TypeVar, cast
@@ -9,16 +9,16 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-# one number or an array of them, as whoever calls has them; and whatever `real` makes an array of
+# `Given`: one number or an array of numbers, as callers have them; `Numbers`: everything that `real` converts
 Given = float | np.floating | np.integer | np.ndarray | jax.Array
 Numbers = Given | Sequence[Given] | Sequence[Sequence[Given]]
 
 
 class Callback(Protocol):
-    """Who wants to know how far a sweep or a search has come; an exception in it ends the work."""
+    """Function that is called with the progress of a sweep or a search; an exception in it ends the work."""
 
     def __call__(self, done: int, total: int, best: float | None, /) -> None:
-        """Is told the variants or steps done, all of them, and the best objective so far; None where none is sought."""
+        """Receive the variants or steps done, their total number and the best objective so far (None without one)."""
 
 
 _SHOWN = 6  # numbers of an array that are printed; of a longer one its range is

@@ -43,13 +43,14 @@ Levers = Float[Array, "pairs *each positions"]
 
 
 class Held(NamedTuple):
-    """What an elimination needs besides the coupling itself.
+    """Inverses and products of a coupling that its eliminations share.
 
     Attributes:
-        local: rest C; of every slice where they are scaled, of the springs that can touch.
-        inverse: of C.
-        share_inverse: of M.
-        modal: inverse of M x C where a second body feels loads otherwise; None without one.
+        local: rest C, summed over both bodies, of the springs that can touch; with an axis of slices where they are
+            scaled.
+        inverse: inverse of C.
+        share_inverse: inverse of M.
+        modal: inverse of the sum of M x C over both bodies, where there is an `other`; None without one.
     """
 
     local: Float[Array, "pairs pairs *own positions"]
@@ -70,11 +71,11 @@ class Held(NamedTuple):
 
 
 class Other(eqx.Module):
-    """By how much one of two bodies spreads loads otherwise than the other.
+    """Difference between the load spreading of one of two bodies and that of the other.
 
     Attributes:
-        compliance: of that body.
-        share, rest: differences of M and of the rest; what both bodies make together is positive definite.
+        compliance: C of the body that differs.
+        share, rest: its M and rest, minus those of `SliceCoupling`; the sum over both bodies is positive definite.
     """
 
     compliance: Springs
@@ -88,7 +89,7 @@ class SliceCoupling(eqx.Module):
     Attributes:
         modes: V, orthonormal, the constant first; with the weights w of the slices, V^T w V = 1, where they differ.
         share: M, symmetric and positive definite.
-        rest: what all that is orthogonal to the modes has of C.
+        rest: share of C that acts on loads orthogonal to the modes, slice by slice.
         support_modes: R, orthonormal likewise, the constant first; None without a support.
         support: H, symmetric and positive semi-definite, the deflection under line loads; None without a support.
         crosswise: whether H only joins the even deflection with one other shape, zero but off its diagonal.
@@ -181,7 +182,7 @@ def _blocks(share: Float[Array, "modes modes"], compliance: Springs) -> Blocks:
 
 
 def _block_inverse(matrix: Blocks) -> Blocks:
-    """Of a symmetric, positive definite matrix at every position, swept block by block."""
+    """Inverse of a symmetric, positive definite block matrix at every position, swept block by block."""
 
     def sweep(k, matrix):
         inverse = small_inverse(matrix[k, k])
@@ -329,7 +330,7 @@ def _products(coupling: SliceCoupling, rows: Inverse) -> list[Float[Array, "_ sp
 def _eliminated(coupling: SliceCoupling, modal: list[Float[Array, "_ springs springs positions"]]) -> list[_Block]:
     held = coupling.held
     blocks: list[_Block] = []
-    assert held is not None  # whoever eliminates gives the inverses
+    assert held is not None  # set by `with_inverses` before every elimination
     for mode in range(len(modal)):
         scaled = modal[mode] + held.column(mode)
         for before, block in enumerate(blocks):

@@ -96,7 +96,7 @@ def _exchanged(slab: Slab, chosen: Int[Array, " n"], at) -> tuple[Slab, Int[Arra
 
 
 def pivots(matrix: Matrix) -> Float[Array, " n"]:
-    """Of the elimination of a symmetric matrix without exchanges; their product is its determinant where all are
+    """Pivots of a symmetric matrix, eliminated without exchanges; their product is its determinant where all are
     positive. Not differentiable.
     """
     rows = jnp.arange(len(matrix))

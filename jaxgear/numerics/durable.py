@@ -1,4 +1,4 @@
-"""Files that are there as a whole or not at all, and what a program keeps between two processes."""
+"""Files that are written as a whole or not at all, and private folders for data that outlives a process."""
 
 import hashlib
 import os
@@ -45,19 +45,19 @@ def unsealed(kept: bytes) -> bytes | None:
 
 
 class KeptFiles:
-    """Bytes as files of a folder, named by all that they depend on.
+    """Contents kept as files of a folder, named by a checksum of everything that they depend on.
 
     Args:
-        folder: where they lie.
-        surroundings: what all of them depend on.
-        executed: whether they may be executed, so that only files are read that nobody else can have written.
+        folder: folder of the files.
+        surroundings: bytes that describe what all contents depend on.
+        executed: True if contents may be executed: only files that other users cannot have written are read then.
     """
 
     def __init__(self, folder: Path, surroundings: bytes = b"", *, executed: bool = False) -> None:
         self._folder, self._here, self._executed = folder, surroundings, executed and os.name == "posix"
 
     def read(self, made_of: bytes) -> bytes | None:
-        """What was written; None where nothing was, where it is damaged, or where others can have written it."""
+        """Content written for `made_of`; None if it is missing or damaged, or if others can have written it."""
         file = self._file(made_of)
         try:
             if self._executed:
@@ -69,7 +69,7 @@ class KeptFiles:
         return unsealed(kept)
 
     def write(self, made_of: bytes, content: bytes) -> None:
-        """Keeps something, if the disk allows it."""
+        """Write a content; do nothing where the disk does not allow it."""
 
         def write(file):
             if self._executed:
@@ -86,7 +86,7 @@ class KeptFiles:
 
 
 def _read_own(path: Path) -> bytes:
-    """The bytes of a regular file that nobody but this user can have placed or written, of a POSIX system.
+    """Bytes of a regular file that only this user can have placed or written, on a POSIX system.
 
     Folder and file are judged once they are open: what a path leads to can change between a look and a use.
 
@@ -107,7 +107,7 @@ def _read_own(path: Path) -> bytes:
 
 
 def _is_own(status: os.stat_result) -> bool:
-    """Whether this user owns a file or folder, and nobody else writes it."""
+    """Whether this user owns a file or folder and is the only one who may write it."""
     return status.st_uid == os.getuid() and not status.st_mode & 0o022
 
 
@@ -124,7 +124,7 @@ def forget_the_oldest(folder: Path, most: int) -> None:
 
 
 def user_folder(*names: str) -> Path | None:
-    """A folder below the user's cache directory that nobody else can write to; None where there can be none."""
+    """A folder below the user's cache directory that only this user can write; None where it cannot be made."""
     try:
         folder = _user_cache().absolute().joinpath(*names)
         for part in (*reversed(folder.parents), folder):  # `parents=True` would make those above by the umask
@@ -138,7 +138,7 @@ _MOST = 256 << 20  # bytes of all programs of one kind that are kept
 
 
 def program_folder(name: str) -> Path | None:
-    """The folder of this name for compiled programs, where the oldest make room; None where there can be none."""
+    """Private folder of this name for compiled programs, limited in size; None where it cannot be made."""
     folder = user_folder(__name__.partition(".")[0], name)
     if folder is None:
         return None
@@ -160,7 +160,7 @@ def _user_cache() -> Path:
 
 
 def _is_private(folder: Path) -> bool:
-    """What is kept may be executed: nobody else may be able to place it, or a folder or link on the way to it."""
+    """Whether only this user can place files in a folder, and folders or links on the way: files may be executed."""
     if not os.access(folder, os.W_OK):
         return False
     if sys.platform == "win32":
@@ -169,7 +169,7 @@ def _is_private(folder: Path) -> bool:
 
 
 def _is_out_of_reach(folder: Path) -> bool:
-    """Whether nobody but the user and the system can replace what is in a folder, or where it leads."""
+    """Whether only this user and the system can replace what a folder contains, or where a link leads."""
     link, status = folder.lstat(), folder.stat()
     if {link.st_uid, status.st_uid} - {0, os.getuid()}:
         return False

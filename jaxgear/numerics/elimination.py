@@ -103,7 +103,7 @@ def inverse_of(factors: Factors) -> list[Rows]:
 
 
 def small_inverse(matrix: Float[Array, "pairs pairs positions"]) -> Float[Array, "pairs pairs positions"]:
-    """Of a symmetric, positive definite matrix at every position: of one row and column, then bordered by others."""
+    """Inverse of a symmetric, positive definite matrix at every position, bordered row by row."""
     rows = [[1 / matrix[0, 0]]]
     for k in range(1, len(matrix)):
         border = [matrix[k, j] for j in range(k)]

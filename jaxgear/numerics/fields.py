@@ -56,18 +56,19 @@ class Usual(NamedTuple):
 
 @dataclasses.dataclass(frozen=True)
 class Number:
-    """What a number field may hold.
+    """Unit, range and shape of the values that a number field accepts.
 
     Attributes:
-        unit: "" for a pure number.
+        unit: unit of the value, "" for a pure number.
         low, high: allowed range, None without a limit.
-        open_low, open_high: the limit itself is not allowed.
-        whole: whole numbers only.
-        optional: None is allowed.
+        open_low, open_high: True if the limit itself is not allowed.
+        whole: True for whole numbers only.
+        optional: True if None is allowed.
         shape: names of the axes, () for a single number.
         fewest: smallest length of an axis.
-        limits: lower and upper limit, shape (2,), may stand for a single number.
-        static: a Python number that is part of the structure, not a leaf; with a shape, a tuple of whole numbers.
+        limits: True if lower and upper limit, shape (2,), are allowed in place of a single number.
+        static: True for a Python number that is part of the structure, not a leaf; with a shape, a tuple of whole
+            numbers.
         checked: False for a result, which may hold anything, NaN included.
         usual: usual range; beyond it the logger of the package, ".unusual", warns once per field.
     """
@@ -88,7 +89,7 @@ class Number:
 
 
 class Limits(TypedDict, total=False):
-    """What of a `Number` its field may say."""
+    """Keyword arguments of `number`: the fields of `Number` that a declaration may set."""
 
     low: float | None
     high: float | None

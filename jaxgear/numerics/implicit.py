@@ -254,13 +254,13 @@ _LEAST_SHARE = 1 / 64  # of a Newton step; a root that needs smaller ones is out
 
 
 class NewtonRoot(NamedTuple):
-    """What Newton's method ended with.
+    """Result of Newton's method.
 
     Attributes:
         root: the unknowns.
-        residual: of the equations there.
-        jacobian: of the equations there.
-        steps: that were taken.
+        residual: residual of the equations at the root.
+        jacobian: Jacobian of the equations at the root.
+        steps: number of evaluations.
         converged: whether the next step would have been below the tolerance.
     """
 

@@ -12,12 +12,12 @@ def enable_cache() -> Path | None:
     """Keep compiled programs for the next start of a script: it then traces them, and compiles nothing.
 
     JAX's persistent compilation cache, in a private folder of the user's cache folder and of at most 256 MB, for every
-    program of this process from now on, whoever made it. Call it before the first computation. The commands have a
-    cache of their own.
+    program that this process compiles from now on. Call it before the first computation. The commands have a cache of
+    their own.
 
     Returns:
-        the folder; that which JAX keeps programs in already, where it does; None where there is none: it cannot be
-        made, or others can write to it.
+        the folder; JAX's present one where its cache is already enabled; None where the folder cannot be made or where
+        others can write to it.
     """
     if jax.config.jax_compilation_cache_dir:  # type: ignore[attr-defined]
         return Path(jax.config.jax_compilation_cache_dir)  # type: ignore[attr-defined]

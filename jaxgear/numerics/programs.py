@@ -33,10 +33,10 @@ _everything = False
 
 
 def compile_quickly() -> None:
-    """From now on every program of this process is compiled quickly, unless the user has said how.
+    """Compile every program of this process quickly from now on, unless the user has set compiler options.
 
     For a process whose longest programs, too, take longer to compile than to run: they are compiled in a third of the
-    time and run half as long again.
+    time and run for 1.5 times as long.
     """
     global _everything
     if quick_options() is not None:
@@ -107,7 +107,7 @@ def quick_options() -> dict[str, Any] | None:
 
 
 def known_of(options: dict[str, Any]) -> dict[str, Any]:
-    """Those of the options that the compiler knows: it refuses every program with one that it does not know."""
+    """The given options without those that the compiler does not know: one of these would make it refuse programs."""
     if _compiles(options):
         return options
     return {name: value for name, value in options.items() if _compiles({name: value})}
@@ -303,7 +303,7 @@ def begin(function: Callable[..., Any], *args: PyTree, **options: PyTree) -> PyT
 
 
 class _Kind(enum.Enum):
-    """What a class of arguments is to a store."""
+    """Treatment of a class of arguments by a store."""
 
     TRACED = enum.auto()
     OF_JAX = enum.auto()
@@ -337,7 +337,7 @@ def _is_left_to_jax(leaf) -> bool:
 
 
 def _shape_of(leaf) -> _Shape | None:
-    """What stands for an array; None for everything else."""
+    """Shape and type of an array; None for everything else."""
     kind = _kind_of(leaf.__class__)
     if kind is _Kind.OTHER:
         return None
@@ -413,7 +413,7 @@ class Recipe(pickle.Pickler):
         if not isinstance(obj, type | types.FunctionType):
             return None
         if obj.__module__.partition(".")[0] not in _KNOWN:
-            raise pickle.PicklingError(f"{obj.__module__} can change without a word")
+            raise pickle.PicklingError(f"{obj.__module__} is not a package whose version is recorded")
         if isinstance(obj, type):
             return "class", obj.__module__, obj.__qualname__
         enclosed = [cell.cell_contents for cell in obj.__closure__ or ()]
@@ -421,7 +421,7 @@ class Recipe(pickle.Pickler):
 
 
 def _recipe(made_of: Any) -> bytes | None:
-    """What a program is made of as bytes; None where that cannot be told."""
+    """Description of what a program is made of, as bytes; None where it cannot be written."""
     written = io.BytesIO()
     try:
         Recipe(written).dump(made_of)

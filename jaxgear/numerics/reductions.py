@@ -77,7 +77,7 @@ def _largest_jvp(axis, primals, tangents):
 
 
 def _place(axis: int, x):
-    """Where the first largest entry is; a mask, since its transpose is a selection and no scatter.
+    """Mask of the first largest entry; the transpose of a mask is a selection and no scatter.
 
     In double precision the last bits of the mantissa make way for the place: the largest integer along an axis is found
     faster than an argmax (3 % of a gradient of the PPTE), at the price that entries equal to ten digits count as equal.

@@ -32,7 +32,7 @@ class AbstractMeasure(Checked):
 
     @quick_jit
     def shares(self, values: Values, weights: Values) -> Values:
-        """What every value contributes to the result, in the order of the values; they sum to 1."""
+        """Weight of every value in the result, in the order of the values; the weights sum to 1."""
         order = jnp.argsort(values)
         cumulative = jnp.cumsum(weights[order])
         edges = jnp.concatenate([jnp.zeros_like(cumulative[:1]), cumulative / cumulative[-1]])

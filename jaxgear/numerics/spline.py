@@ -114,5 +114,5 @@ def _end_slope(near, next_one, secant, next_secant):
 
 
 def _widths(positions: Points, values: Table) -> Float[Array, "points-1 ..."]:
-    """Of the intervals, along the first of the table's axes."""
+    """Widths of the intervals, along the first axis of the table."""
     return jnp.diff(positions).reshape(-1, *(1,) * (values.ndim - 1))

@@ -125,7 +125,7 @@ def _law(tooth: Tooth, rho: np.ndarray) -> np.ndarray:
 
 
 def _wedge(tooth: Tooth, rho: np.ndarray) -> np.ndarray:
-    """What `EdgeLaw` adds for the tip's wedge under the patch, so that it is not counted twice."""
+    """Compliance that `EdgeLaw` adds for the wedge of the tip, to be left out of the table."""
     b = 0.5 * (np.pi / 2 + np.arctan(tooth.tip_roll_length / tooth.base))
     twin = 0.5 * np.sin(2 * b)
     excess = np.sin(b) ** 2 / (b + twin) + np.cos(b) ** 2 / (b - twin) - 2 / np.pi

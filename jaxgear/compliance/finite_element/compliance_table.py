@@ -168,7 +168,7 @@ def different(table: GearTable, shape: Shape) -> str | None:
 
 
 def _without_unknown_derivatives(gear: Gear) -> Gear:
-    """The gear; whoever asks for a derivative by a number that shapes it is refused."""
+    """The gear; a derivative by a number that determines its table raises a `ValueError`."""
     names = _HELD if gear.cutter_teeth is None else (*_HELD, *_CUTTER)
     held = {name: _held(name, getattr(gear, name)) for name in names}
     ratios = [name for name in ("tip_diameter", "bore_diameter") if getattr(gear, name) is not None]

@@ -2,7 +2,7 @@
 
 The sector is factorised once with its cuts free. What joins the sectors are forces on the cuts: for each harmonic of
 the ring, in which a sector moves as its neighbour does but for a phase exp(2 pi i n / z), they follow from a small
-dense system. A load on one tooth is the mean of its harmonics: the effort hardly grows with the number of teeth.
+dense system. A load on one tooth is the mean of its harmonics, so that the effort grows little with the tooth number.
 """
 
 from typing import NamedTuple

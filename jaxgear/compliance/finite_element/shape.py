@@ -15,15 +15,15 @@ _DIGITS = 7  # significant ones of the numbers, so that both precisions mean the
 
 
 class Shape(NamedTuple):
-    """What the elasticity of a gear depends on besides its size and its modulus; lengths in modules.
+    """Numbers that the elasticity of a gear depends on besides its size and its modulus; lengths in modules.
 
     Attributes:
         teeth: number of teeth.
-        pressure_angle: of the basic rack [deg].
+        pressure_angle: pressure angle of the basic rack [deg].
         profile_shift, dedendum, root_radius: as in `Gear`.
         tip_ratio, bore_ratio: radii of tip and bore over the module.
         poisson: Poisson's ratio of the plane problem.
-        allowance: of the tooth thickness over the module.
+        allowance: tooth thickness allowance over the module.
         cutter_teeth, cutter_profile_shift: as in `Gear`; 0 teeth for a rack.
     """
 
@@ -41,11 +41,11 @@ class Shape(NamedTuple):
 
     @property
     def numbers(self) -> tuple[float, ...]:
-        """Those that tell gears apart: without the cutter's where a rack generates the tooth."""
+        """All numbers of the gear; those of the cutter only where a cutter generates the tooth."""
         return tuple(self) if self.cutter_teeth else tuple(self[:-2])
 
     def rounded(self) -> "Shape":
-        """Seven significant digits: what single precision holds."""
+        """The shape with numbers of seven significant digits, which single precision holds."""
         return Shape(*(float(f"{value:.{_DIGITS}g}") for value in self))
 
 
