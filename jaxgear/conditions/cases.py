@@ -114,7 +114,7 @@ class LoadSpectrum(Checked):
         """Revolutions of the pinion at every torque; their shares, the weights, without a duration.
 
         Args:
-            owner: who asks, for messages.
+            owner: name of the caller, for messages.
 
         Raises:
             ValueError: for a duration without speeds.

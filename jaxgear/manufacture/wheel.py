@@ -24,7 +24,7 @@ from ..numerics import Checked, Given, check, concrete, minimum, number, program
 
 Profile = Float[Array, " points"]
 
-_POINTS = 201  # of a profile, where nobody asks for others
+_POINTS = 201  # of a profile, by default
 
 
 class SpaceFlank(NamedTuple):

@@ -43,7 +43,7 @@ class Linearizer:
         self._parts = [problem.on(mesh) for mesh in meshes] if len(meshes) > 1 else [problem]
 
     def on(self, problem: Problem) -> "Linearizer":
-        """That of the same problem on another mesh, by the same program if there can be one."""
+        """Linearizer of the problem on another mesh, in parts of as many positions to reuse the program."""
         return Linearizer(problem, self.batch, self._positions)
 
     def __call__(self, points: np.ndarray) -> list[Linearization]:
@@ -375,7 +375,7 @@ class _Program:
         for column, value in cost.items():
             coefficients[column] = value
         lowest = [-np.inf if bound is None else bound for bound in self._lows]
-        # a linear program is a mixed-integer one without integers: the same solver with half the ado
+        # a mixed-integer program without integers: the solver of `linprog` with less overhead
         found = scipy.optimize.milp(
             coefficients,
             constraints=scipy.optimize.LinearConstraint(matrix, -np.inf, np.concatenate(self._limits)),
