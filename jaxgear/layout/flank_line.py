@@ -193,7 +193,7 @@ class FlankLine(Checked):
 
     @property
     def modification(self) -> AbstractModification:
-        """As a modification of the flank."""
+        """Modification of the flank: slope and crowning."""
         return LeadSlope(self.slope) + LeadCrowning(self.crowning)
 
     def on(self, pair: GearPair, gear: GearName) -> "FlankLine":

@@ -258,7 +258,7 @@ def _between(place: Points, low: Scalar, high: Scalar) -> Bool[Array, " points"]
 
 
 def _band(values: Points, inside: Marks, counted: Marks) -> Scalar:
-    """From the least of the values inside to the largest of those counted, which holds the ones inside."""
+    """Largest value of those counted, which include the ones inside, less the least of those inside."""
     first = values[jnp.argmax(inside)]
     return maximum(jnp.where(counted, values, first)) - minimum(jnp.where(inside, values, first))
 

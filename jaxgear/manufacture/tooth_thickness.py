@@ -83,7 +83,7 @@ def _half_span(gear: Gear, length: Scalar) -> Scalar:
 
 
 def _across(gear: Gear, length: Scalar) -> Scalar:
-    """How much of the face a length across the teeth takes [mm]."""
+    """Length along the face that a length across the teeth takes [mm]."""
     return length * jnp.abs(jnp.sin(gear.base_helix_angle))
 
 

@@ -235,5 +235,5 @@ def _end(side: Side, modification: AbstractModification) -> Scalar:
 
 
 def _depth(side: Side) -> Scalar:
-    """From the tip to the root circle [mm]."""
+    """Radial distance from the root to the tip circle [mm]."""
     return side.gear.tip_radius - side.gear.root_circle_radius

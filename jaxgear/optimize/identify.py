@@ -430,7 +430,7 @@ def _closed(teeth: int) -> Float[np.ndarray, "teeth independent"]:
 
 
 def _gaps(mesh: Mesh, windows: np.ndarray, counts: Sequence[int], spreads: Sequence[float | None]) -> Array:
-    """As of `_Problem`: cumulative pitch deviations, around their mean, of both teeth of every pair."""
+    """Gaps of `_Problem`: cumulative pitch deviations, around their mean, of both teeth of every pair."""
     numbers = windows[:, None] + pairs_in_window(mesh.resolution)
     found = [jnp.zeros((*numbers.shape, 0), mesh.slice_width.dtype)]
     for gear, count, spread in zip(mesh.pair.gears, counts, spreads):

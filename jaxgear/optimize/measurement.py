@@ -139,7 +139,7 @@ class Data(eqx.Module):
     noise: Rows
 
     def at(self, of: Float[Array, "torques places *columns"]) -> Float[Array, "rows *columns"]:
-        """At the readings, between positions of the mesh by a straight line."""
+        """Values at the readings, linearly interpolated between positions of the mesh."""
         first, second = of[self.level, self.before], of[self.level, self.after]
         return first + self.share.reshape(-1, *[1] * (first.ndim - 1)) * (second - first)
 
@@ -201,7 +201,7 @@ class Errors(NamedTuple):
         return of - self.shapes @ along, along
 
     def whitened(self, size: Scalar, of: Float[Array, "rows columns"]) -> Float[Array, "sums columns"]:
-        """As independent sums of readings in standard deviations."""
+        """Columns of readings as independent sums, in standard deviations."""
         outside, along = self.split(of)
         return jnp.concatenate([outside, along / self._deviation(size)])
 

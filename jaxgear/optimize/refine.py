@@ -159,7 +159,7 @@ def _left_by_slices(record: Record) -> float:
 
 
 def _kept_to_limits(record: Record, polish: Polish) -> None:
-    """Where no design so far keeps the limits, seeks one by their violation alone, and goes on from it."""
+    """Seek a design that keeps the limits if none does so far, by their violation alone, and polish it."""
     if not counted(record.violation):
         return
     linearizer = record.linearizer or Linearizer(record.problem, _NEAR + _FAR)

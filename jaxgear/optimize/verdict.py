@@ -227,7 +227,7 @@ class Verified(eqx.Module):
     Attributes:
         claimed: PPTE by the structure of the mesh [um].
         ppte: PPTE by the finite-element structure [um]; infinite where a contact solution failed.
-        claimed_objectives: minimized objectives, by name and unit; empty where a curve was levelled.
+        claimed_objectives: objectives of the search, by name and unit; empty where a curve was levelled.
         objectives: objectives by the finite-element structure, by the same measure over the same cases.
         cycle: mesh cycle by the finite-element structure.
     """

@@ -150,7 +150,7 @@ class ShaftSupport(AbstractSupport):
 
     @property
     def torque(self) -> Scalar:
-        """On the pinion [N m]."""
+        """Torque on the pinion [N m]."""
         return self.gearbox.pinion_torques()[self.mesh]
 
     @property

@@ -103,7 +103,7 @@ class ShaftLoad(Checked):
 
     @property
     def vector(self) -> Float[Array, "5"]:
-        """In x, y, z, rx, ry [N, N mm]."""
+        """Force and moment in x, y, z, rx, ry [N, N mm]."""
         return jnp.concatenate([self.force, 1e3 * self.moment])
 
 
@@ -180,7 +180,7 @@ class Shaft(Checked):
 
     @property
     def valid(self) -> Bool[Array, ""]:
-        """Whether such a shaft can be; concrete ones that cannot are refused, traced ones flagged."""
+        """True if the shaft passes its checks; concrete shafts that do not are refused, traced ones flagged."""
         return _holds(facts_of(self))
 
     def _named(self) -> tuple[tuple[str, str], ...]:

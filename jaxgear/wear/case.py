@@ -313,7 +313,7 @@ class Case(eqx.Module):
         return jnp.where(solved(cycles), jax.lax.map(on, (marched.depth, cycles)), jnp.nan)
 
     def dynamic_factor(self, marched: March) -> Float[Array, "steps *torques"] | None:
-        """At all time steps of a march, as its `cycles`; None without dynamics."""
+        """Dynamic factor at all time steps of a march, axes as those of `cycles`; None without dynamics."""
         if self.vibration is None:
             return None
         found = jnp.where(marched.status[:, None] == Status.CONVERGED, marched.seen[_DYNAMIC_FACTOR], jnp.nan)
