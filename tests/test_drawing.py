@@ -332,18 +332,18 @@ def test_diameters_of_a_drawing_make_the_rack(load):
 
 SPAN = "span = 23.0\nteeth_spanned = 3"
 REFUSED = {
-    "two measures": (SPAN + "\nover_balls = 64.0\nball_diameter = 5.5", "", "pinion.over_balls: cannot stand beside"),
+    "two measures": (SPAN + "\nover_balls = 64.0\nball_diameter = 5.5", "", "pinion.over_balls: cannot be given with"),
     "measure and allowance": (
         SPAN + "\ntooth_thickness_allowance = -60.0",
         "",
-        "pinion.tooth_thickness_allowance: cannot stand beside span: either says how thick",
+        "pinion.tooth_thickness_allowance: cannot be given with span: give one",
     ),
     "two roundings": (
         "full_root_radius = true\nroot_form_diameter = 54.0",
         "",
-        "pinion.full_root_radius: cannot stand beside root_form_diameter",
+        "pinion.full_root_radius: cannot be given with root_form_diameter",
     ),
-    "two roots": ("root_diameter = 50.0\ndedendum = 1.3", "", "pinion.root_diameter: cannot stand beside dedendum"),
+    "two roots": ("root_diameter = 50.0\ndedendum = 1.3", "", "pinion.root_diameter: cannot be given with dedendum"),
     "no rack so deep": (
         "root_diameter = 40.0",
         "",

@@ -107,14 +107,14 @@ class LoadSpectrum(Checked):
 
     @property
     def hours(self) -> Float[Array, " torques"] | None:
-        """At every torque [h]; None without a duration."""
+        """Hours at every torque [h]; None without a duration."""
         return None if self.duration is None else self.weights * self.duration
 
     def turns(self, owner: str) -> Float[Array, " torques"]:
         """Revolutions of the pinion at every torque; their shares, the weights, without a duration.
 
         Args:
-            owner: who asks, for messages.
+            owner: name of the caller, for messages.
 
         Raises:
             ValueError: for a duration without speeds.
@@ -145,7 +145,7 @@ Result = TypeVar("Result")  # a tree of arrays
 
 
 class Conditions(Checked):
-    """Under what designs are judged, whatever their mesh: loads, and the gears that run under every one of them.
+    """Conditions to judge designs by, independent of the mesh: loads, and the manufactured gears under each.
 
     All designs meet the same gears, and so do all loads (common random numbers): what is compared differs by the design
     and the load alone.

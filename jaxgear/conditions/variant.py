@@ -55,11 +55,10 @@ class Variant(NamedTuple):
 
 
 class Variants(Checked):
-    """What the named variables of a problem make.
+    """Flanks, pair and load of a problem as functions of its named variables.
 
-    A variable is used wherever a function asks for it: in the flanks (`design`), in the pair (a `mesh` that is a
-    function), in the load (a `torque` that is one). What is no function is the same for all variants, and worked out
-    once.
+    A variable is passed to every function that names it: to the flanks (`design`), the pair (a `mesh` that is a
+    function), the load (a `torque` that is one). Anything else is the same for all variants and is computed once.
 
     Attributes:
         names: of the variables.
@@ -205,7 +204,7 @@ def check_used(owner: str, names: Sequence[str], used: Sequence[str]) -> None:
 
 
 def two_modifications(made: object) -> tuple[AbstractModification, AbstractModification]:
-    """What a design has made, with nominal involutes for None.
+    """Modifications (pinion, wheel) returned by a design, with nominal involutes for None.
 
     Raises:
         ValueError: for anything but two modifications.
@@ -222,7 +221,7 @@ def two_modifications(made: object) -> tuple[AbstractModification, AbstractModif
 
 
 def _in_range(tree) -> Iterator[Bool[Array, ""]]:
-    """Of every traced number in the Modules of a tree, whether it is within the range of its field.
+    """Flags of the traced numbers in the Modules of a tree: finite, and within the range of the field.
 
     Modules refuse concrete numbers out of range when they are made; traced ones pass, and would turn an impossible
     design into some number.

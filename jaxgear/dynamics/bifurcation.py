@@ -269,9 +269,9 @@ class _Search(NamedTuple):
 
 
 def _searched(family: Family, kind: Kind, begin: Place, normal: Place, multiplier, scales, nodes, periods) -> _Search:
-    """Where the test of a kind is zero over the distance along a normal: false position (Illinois).
+    """Search for the zero of the test of a kind along a normal: false position (Illinois).
 
-    Until the test has changed its sign, secants that go somewhat too far.
+    Until the test has changed its sign, secants extended by a factor.
     """
 
     def at(distance):

@@ -273,7 +273,7 @@ def _joins(here: Orbit, there: Orbit) -> bool:
 
 
 def _odd(orbit: Orbit) -> np.ndarray:
-    """By how much the state differs from that half an orbit later."""
+    """DTE and scaled DTE rate [um] at the start of an orbit, less their values half an orbit later."""
     scale = 2 * np.pi * float(orbit.mesh_frequency)
     halves = (np.split(np.asarray(part), 2) for part in (orbit.dte, orbit.dte_rate / scale))
     return np.array([first[0] - second[0] for first, second in halves])

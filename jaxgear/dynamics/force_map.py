@@ -25,12 +25,12 @@ _FIRST_STEP = 0.3
 
 
 class Rows(NamedTuple):
-    """What the force at one mesh position depends on; first the drive, then the coast flanks.
+    """Force over the DTE at one mesh position; first the drive, then the coast flanks.
 
     Attributes:
         start: DTE at which the drive flanks touch, and the negative of that at which the coast flanks do [um].
         force: at the levels of DTE beyond `start` [N], shape (sides x levels,).
-        rise: its slope over the number of the level [N], same shape.
+        rise: slope of the force over the number of the level [N], same shape.
     """
 
     start: Sides

@@ -53,7 +53,7 @@ class IsoDynamicFactor(Checked):
 
     @property
     def range(self) -> str:
-        """Of the speed: "subcritical", "main resonance", "intermediate" or "supercritical"; for concrete numbers."""
+        """Speed range: "subcritical", "main resonance", "intermediate" or "supercritical"; of concrete numbers only."""
         ratio = float(self.resonance_ratio)
         if ratio <= float(self.main_resonance_begins):
             return "subcritical"

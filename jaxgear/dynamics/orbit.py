@@ -268,7 +268,7 @@ def settled_orbit(
 
 
 def orbit_at(oscillator: Oscillator, z: Unknowns, steps: Steps, frequency: Scalar, periods: int) -> Orbit:
-    """What the orbit through some unknowns does."""
+    """Orbit over `periods` mesh cycles from the unknowns z, with its monodromy matrix and residual."""
 
     def flown(z):
         end, states = cycles(oscillator, unscaled(z, frequency), steps, frequency, periods)

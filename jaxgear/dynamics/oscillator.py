@@ -21,14 +21,14 @@ NEWTON = 1e6
 
 
 class Excitation(Checked):
-    """What drives a mesh besides its own force: harmonics of the mesh frequency.
+    """External excitation of a mesh: harmonics of the mesh frequency.
 
     Attributes:
         load: amplitudes of the load relative to its mean, shape (orders,): 1 + sum load_n cos(2 pi n phase + angle_n).
-        load_angle: [rad], shape (orders,).
+        load_angle: phase angles of the load [rad], shape (orders,).
         displacement: amplitudes of a displacement between the gears [um], for instance a cumulated pitch deviation,
-            shape (orders,); it is taken off the DTE that the flanks feel.
-        displacement_angle: [rad], shape (orders,).
+            shape (orders,); subtracted from the DTE of the gears to give that of the flanks.
+        displacement_angle: phase angles of the displacement [rad], shape (orders,).
         orders: multiples of the mesh frequency, shape (orders,).
     """
 
@@ -88,7 +88,7 @@ class Oscillator(WithStatus, Checked):
         return v, self.newton * total / self.mass
 
     def support_force(self, x: Coordinates, v: Coordinates) -> Coordinates:
-        """What holds every coordinate against ground and the others [N], positive against its displacement."""
+        """Force of the supports on every coordinate [N], positive against its displacement; without the mesh."""
         total = jnp.zeros_like(x)
         if self.stiffness is not None:
             total = total + self.stiffness @ x
@@ -98,7 +98,7 @@ class Oscillator(WithStatus, Checked):
 
     @property
     def status(self) -> Statuses:
-        """Of the contacts that its mesh force was made of; a force in closed form has converged."""
+        """Status of the contacts behind the mesh force; converged for a force in closed form."""
         return jnp.asarray(getattr(self.mesh_force, "status", Status.CONVERGED.value), jnp.int8)
 
     def dte(self, phase: Scalar, x: Coordinates) -> Scalar:

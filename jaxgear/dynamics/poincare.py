@@ -40,7 +40,7 @@ def after(oscillator: Oscillator, y: State, steps: Steps, mesh_frequency: Scalar
 
 
 def moved(oscillator: Oscillator, z: Unknowns, steps: Steps, mesh_frequency: Scalar, count: int) -> Unknowns:
-    """By how much the unknowns change over some cycles: zero on a periodic orbit."""
+    """Change of the unknowns over `count` mesh cycles [um]; zero on a periodic orbit."""
     y = after(oscillator, unscaled(z, mesh_frequency), steps, mesh_frequency, count)
     return scaled(y, mesh_frequency) - z
 
@@ -53,7 +53,7 @@ _Tree = TypeVar("_Tree")
 def checked(
     owner: str, oscillator: Oscillator, mesh_frequency: Given, start: Start, steps: Numbers
 ) -> tuple[Scalar, State, Nodes]:
-    """Mesh frequency and start as arrays of the oscillator's type, and what `steps_at` takes.
+    """Mesh frequency and start as arrays of the oscillator's type, and checked steps (`nodes_of`).
 
     Raises:
         TypeError: for something else than an `Oscillator`.
@@ -80,7 +80,7 @@ def checked(
 
 
 def nodes_of(owner: str, steps: Numbers) -> Nodes:
-    """What `steps_at` takes, checked.
+    """Checked input of `steps_at`: number of steps, or nodes from 0 to 1 [base pitches].
 
     Raises:
         ValueError: for fewer than two steps, or nodes that do not increase from 0 to 1.
@@ -119,11 +119,11 @@ class OverSpeed(eqx.Module):
 
 
 class Scales(NamedTuple):
-    """What makes places along a branch numbers of like size.
+    """Scales that bring all coordinates of a place along a branch to similar size.
 
     Attributes:
-        size: of the unknowns [um].
-        parameter: of the parameter of the family, in its own unit.
+        size: scale of the unknowns [um].
+        parameter: scale of the parameter of the family, in its own unit.
     """
 
     size: Scalar
@@ -142,8 +142,8 @@ class Corrected(NamedTuple):
     """A point of a branch.
 
     Attributes:
-        place: where it is.
-        tangent: of the branch, of length one; the last number is that of the parameter.
+        place: unknowns and parameter of the point, divided by their scales.
+        tangent: unit tangent of the branch; its last component is along the parameter.
         monodromy: derivative of the state after the orbit by the state before, in the unknowns of the place.
         evaluations: of the Poincare map.
         converged: whether there is an orbit.
@@ -171,7 +171,7 @@ def family_of(oscillator: Oscillator | Family) -> Family:
 
 
 def change(family: Family, place: Place, scales: Scales, nodes: Nodes, periods: int) -> Array:
-    """By how much the unknowns change over an orbit, divided by their scale."""
+    """Change of the unknowns over an orbit, divided by their scale."""
     z, parameter = scales.unknowns(place)
     oscillator, frequency = family(parameter)
     return moved(oscillator, z, steps_at(oscillator, nodes), frequency, periods) / scales.size

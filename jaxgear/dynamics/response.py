@@ -1,4 +1,4 @@
-"""What a recorded orbit of an oscillator says: dynamic factor, vibration, spectra, shares of contact."""
+"""Results of a recorded orbit of an oscillator: dynamic factor, vibration, spectra, shares of contact."""
 
 from typing import Literal, NamedTuple
 
@@ -69,13 +69,13 @@ class SpeedResponse(WithStatus, Checked):
 
 
 class Sums(NamedTuple):
-    """Of the steps of an orbit so far: extremes, and integrals over the mesh position.
+    """Extremes and integrals over the mesh position, of the steps of an orbit so far.
 
     Attributes:
         peak: largest elastic mesh force [N].
-        lowest, highest: of the DTE [um].
-        mean, square: integrals of the DTE from where it began, and of its square [um, um^2].
-        apart, coast: time without contact and with coast flanks [cycles].
+        lowest, highest: extremes of the DTE [um].
+        mean, square: integrals of the DTE less its value at the start, and of the square of that [um, um^2].
+        apart, coast: time without contact and with contact of the coast flanks [cycles].
         force, dte: complex Fourier integrals, shape (orders,).
     """
 
@@ -91,7 +91,7 @@ class Sums(NamedTuple):
 
 
 def no_sums(orders: Float[Array, " orders"]) -> Sums:
-    """Before the first step."""
+    """Sums before the first step."""
     zero = jnp.zeros((), orders.dtype)
     spectrum = jax.lax.complex(jnp.zeros_like(orders), jnp.zeros_like(orders))
     return Sums(zero - jnp.inf, zero + jnp.inf, zero - jnp.inf, zero, zero, zero, zero, spectrum, spectrum)
@@ -166,7 +166,7 @@ def with_cycle(before: Sums, of_cycle: Sums, cycle: Int[Array, ""], orders: Floa
 
 
 class Numbers(NamedTuple):
-    """What the sums of a whole orbit amount to; names and units of `SpeedResponse`."""
+    """Results of a whole orbit from its sums; names and units of `SpeedResponse`."""
 
     dynamic_factor: Scalar
     dte_rms: Scalar

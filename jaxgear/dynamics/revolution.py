@@ -25,7 +25,7 @@ class RevolutionForce(WithStatus, AbstractMeshForce):
     cycle; their orbits repeat after the windows, and `shaft_orders` takes the DTE of an orbit of even steps.
 
     Attributes:
-        springs: what it is made of.
+        springs: force over the mesh positions of all windows.
         base_pitches: number of windows.
     """
 
@@ -34,12 +34,12 @@ class RevolutionForce(WithStatus, AbstractMeshForce):
 
     @property
     def status(self) -> Statuses:
-        """Of all contacts."""
+        """Status of the contacts in all windows."""
         return self.springs.status
 
     @property
     def averaged_positions(self) -> int:
-        """As many in every window as a force of one base pitch has."""
+        """Mesh positions over which stiffnesses are averaged: in every window as many as in one base pitch."""
         return POSITIONS * self.base_pitches
 
     def at(self, phase: Scalar) -> PyTree[Array]:

@@ -159,7 +159,7 @@ def _itself(oscillator: Oscillator) -> Oscillator:
 
 
 def _prepared(owner: str, frequencies, runs: Mapping[str, Run], options: dict):
-    """What is static in all runs, and numbers of each, with a leading axis (runs,)."""
+    """Static sizes of all runs, and the limits of each with a leading axis (runs,)."""
     most = max(len(run.kicks) for run in runs.values())
     ways = [run._replace(kicks=(*run.kicks, *[1.0] * (most - len(run.kicks)))) for run in runs.values()]
     each = [prepared(owner, None, frequencies, **run._asdict(), **options) for run in ways]
@@ -176,7 +176,7 @@ def _of_one(oscillator: Oscillator, shared, sizes) -> SpeedResponse:
 
 @kernel
 def _of_designs(rows, shared, make, keep, ways: _Ways, sizes, devices):
-    """What is kept of designs in batches, with the axes of the batches and their designs in front."""
+    """Responses of designs in batches, or `keep` of them, with the axes of batches and designs in front."""
     together = _MADE_TOGETHER if devices.devices.flat[0].platform == "cpu" else _MADE_TOGETHER_ELSEWHERE
 
     def of_design(shared, oscillator):
@@ -198,7 +198,7 @@ def _of_designs(rows, shared, make, keep, ways: _Ways, sizes, devices):
 
 
 def _or_nothing(converged: Bool[Array, ""], part: Array) -> Array:
-    """Numbers of a mesh force that was found."""
+    """The array where the mesh force converged, else NaN (0 for integers)."""
     nothing = jnp.nan if jnp.issubdtype(part.dtype, jnp.floating) else 0
     return jnp.where(converged, part, jnp.full((), nothing, part.dtype))
 
@@ -215,6 +215,6 @@ def _named(found: SpeedResponse, ways: _Ways, axis: int = 0) -> Responses:
 
 @program
 def _along(found: SpeedResponse, axis: int) -> list[SpeedResponse]:
-    """What lies side by side along an axis, one by one."""
+    """Split a batch of responses along an axis."""
     leaves, structure = jax.tree.flatten(found)
     return [jax.tree.unflatten(structure, parts) for parts in zip(*(jnp.unstack(leaf, axis=axis) for leaf in leaves))]

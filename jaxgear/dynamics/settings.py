@@ -123,7 +123,7 @@ class Dynamics(AbstractSettings):
         pinion: AbstractModification | None = None,
         wheel: AbstractModification | None = None,
     ) -> Oscillator:
-        """What vibrates: the dynamic transmission error, and on bearings the centres of both gears.
+        """Oscillator of the dynamic transmission error, and on bearings of the centres of both gears.
 
         Args:
             mesh: prepared mesh.
@@ -165,7 +165,7 @@ class Dynamics(AbstractSettings):
 
     @property
     def run_names(self) -> tuple[str, ...]:
-        """What the speeds are gone through for: rising, falling, and falling with kicks."""
+        """Names of the runs through the speeds: rising, falling, and falling with kicks."""
         falling = (DOWN,) if len(self.mesh_frequencies) > 1 else ()  # at one speed it is the rising run
         return UP, *falling, *((KICKED,) if self.kick is None or self.kick > 1 else ())
 
@@ -235,7 +235,7 @@ class Dynamics(AbstractSettings):
 
     @property
     def traced_steps(self) -> int:
-        """Of the integrator per mesh cycle where the natural frequency is being traced."""
+        """Steps of the integrator per mesh cycle where the natural frequency is being traced."""
         return _STEPS if self.steps is None else self.steps
 
     def force(

@@ -46,12 +46,12 @@ class Speed(NamedTuple):
 
 
 class _Settling(NamedTuple):
-    """Of a motion so far.
+    """Motion so far, on the way to a periodic orbit.
 
     Attributes:
         cycle: number of mesh cycles.
-        period: cycles after which it repeats, 0 for none yet.
-        fresh: cycles since it was last moved.
+        period: mesh cycles after which the motion repeats, 0 for none yet.
+        fresh: cycles since the state was last set by extrapolation.
         past: scaled states at mesh position 0 [um], the last one first, shape (states, unknowns); nan before `fresh`.
     """
 
@@ -108,7 +108,7 @@ def _state(scaled: Unknowns, scale: Unknowns) -> State:
 
 
 def _seen(oscillator: Oscillator, past: Float[Array, "states unknowns"]) -> Array:
-    """What repeats, all in um: of coordinates that nothing holds only the DTE does."""
+    """Signals that repeat on an orbit [um]: DTE and its scaled rate, and on supports every coordinate."""
     zero = jnp.zeros((), past.dtype)
     x, v = jnp.split(past, 2, axis=1)
     dte = jax.vmap(lambda x: oscillator.dte(zero, x))(x)
@@ -160,7 +160,7 @@ def _period(away: Float[Array, " periods"], tolerance: Scalar) -> Int[Array, ""]
 
 
 # Least dynamic factor of a steady motion: over an orbit the mesh force has the mean of the static one, but for a small
-# share where springs beside the mesh carry some of the load. A motion so slow beside the mesh that a cycle hardly moves
+# share where springs parallel to the mesh carry some of the load. A motion so slow that a mesh cycle barely changes
 # it repeats within any tolerance, and is not steady.
 _BALANCED = 0.99
 

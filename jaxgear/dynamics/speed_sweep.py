@@ -35,7 +35,7 @@ MOST_KICK = 50.0  # dynamic factor: many times those that are met
 
 
 class _Sizes(NamedTuple):
-    """What is static in a sweep."""
+    """Static sizes and options of a sweep."""
 
     most_steps: int
     fresh: bool
@@ -246,7 +246,7 @@ def start_of(owner: str, oscillator: Oscillator, start: State | None) -> State |
 def swept(
     oscillator: Oscillator, frequencies: Speeds, start: State | None, limits: _Limits, sizes: _Sizes
 ) -> SpeedResponse:
-    """The response as of an upward sweep; whoever asked for it knows the direction."""
+    """Response of a sweep; its `direction` is always "up" here, the caller replaces it."""
     rest, static = at_rest(oscillator, jnp.zeros((), frequencies.dtype)), static_force(oscillator)
     begin = (rest.coordinates, jnp.zeros_like(rest.coordinates)) if start is None else start
     kick = kick_of(oscillator, rest, limits.kick)

@@ -60,7 +60,7 @@ def differentiable(oscillator: Oscillator, responses: Sequence[SpeedResponse], s
         cases = [*(orbit(periods) for periods in _PERIODS), lambda: found]
         return jax.lax.switch(jnp.asarray(_CHOICE)[period], cases)
 
-    # one after the other: only the orbits that are there are worked out
+    # one after the other: only the branch of the orbit that was found is computed
     found = jax.lax.map(of_speed, together)
     return jax.tree.map(lambda part: part.reshape(len(responses), -1), found)
 
@@ -93,7 +93,7 @@ def _orbit_of(
 
 
 class SteadyForce(NamedTuple):
-    """What a motion that repeats makes of the mesh force, for derivatives by every number of the oscillator.
+    """Mesh force of a periodic motion, differentiable by every number of the oscillator.
 
     Attributes:
         force: elastic force at mesh positions of successive cycles [N], shape (cycles, positions), negative on the

@@ -36,7 +36,7 @@ def _mass_of(gear: Gear) -> Scalar:
 
 
 def _radii(gear: Gear) -> tuple[Scalar, Scalar]:
-    """Of the body [m]."""
+    """Outer and inner radius of the gear body [m]."""
     inner = jnp.zeros_like(gear.module) if gear.bore_diameter is None else gear.bore_radius
     return gear.pitch_radius * _MM, inner * _MM
 
@@ -193,7 +193,7 @@ def on_bearings(
 
 
 def _masses(owner: str, pair: GearPair, inertias) -> Float[Array, "2"]:
-    """Of pinion and wheel on the line of action [kg]."""
+    """Masses of pinion and wheel on the line of action [kg]."""
     given = (inertia_of(pair.pinion), inertia_of(pair.wheel)) if inertias is None else inertias
     radii = jnp.stack([pair.pinion.base_radius, pair.wheel.base_radius]) * _MM
     return _pair_of_numbers(owner, "inertias", "kg m2", given) / radii**2

@@ -83,13 +83,13 @@ def findings_of(
     profiles: ProfileLayout | None = None,
     contact: ContactCases | None = None,
 ) -> tuple[Finding, ...]:
-    """What of a layout and of the shafts that it was made for is not usual; empty where nothing is.
+    """Unusual numbers of a layout and its shafts; empty where there are none.
 
     Args:
         layout: flank lines, not traced.
-        support: that they were made for; bearings move under the torques of its couplings.
-        duty_cycle: for which they were made; None without one.
-        profiles: that were tried on them in step 3; None without it.
+        support: support of the layout; bearings move under the torques of its couplings.
+        duty_cycle: duty cycle of the layout; None without one.
+        profiles: profile modifications tried on the flank lines in step 3; None without it.
         contact: K_Hbeta of the contact analysis in the five cases, by the names of the tolerance and of the step,
             "unmodified", "step 1" and "step 2"; None or empty without it.
     """
@@ -119,7 +119,7 @@ def _of_load(layout: FlankLineLayout) -> Iterator[Finding]:
 
 
 def _of_crowning(layout: FlankLineLayout, contact: ContactCases) -> Iterator[Finding]:
-    """What step 2 costs without deviations, and whether it saves anything in the worst case, by both analyses."""
+    """K_Hbeta after step 2, without deviations and in the worst case, by both analyses."""
     by_annex_e: _Factors = {
         f"{name} deviations": [of[name].face_load_factor for of in layout.cases] for name in layout.before
     }

@@ -81,11 +81,11 @@ class Stations(AbstractSupport):
         return self.table.matrix.shape[-1]
 
     def influence(self, y: Slices) -> Float[Array, "slices slices"]:
-        """That of the table; the face coordinates must be those of the stations."""
+        """Influence matrix of the table [um/N]; the face coordinates must be those of the stations."""
         return self.table.influence(y)
 
     def gap(self, y: Slices) -> Slices:
-        """That of the table; the face coordinates must be those of the stations."""
+        """Gap of the table [um]; the face coordinates must be those of the stations."""
         return self.table.gap(y)
 
     @property
@@ -193,7 +193,7 @@ class FlankLine(Checked):
 
     @property
     def modification(self) -> AbstractModification:
-        """As a modification of the flank."""
+        """Modification of the flank: slope and crowning."""
         return LeadSlope(self.slope) + LeadCrowning(self.crowning)
 
     def on(self, pair: GearPair, gear: GearName) -> "FlankLine":
@@ -244,7 +244,7 @@ def level_load(
 
 
 def coordinates(face: Stations) -> tuple[Float[Array, " slices"], Float[Array, " slices"]]:
-    """What a slope and a crowning of 1 um remove at the stations."""
+    """Modification by a slope and by a crowning of 1 um at the stations [um]."""
     share = even_coordinates(1.0, face.count)
     return share, (2 * share) ** 2
 

@@ -73,7 +73,7 @@ class ProfileLayout:
 
     @property
     def amounts(self) -> tuple[float, float]:
-        """Of the variant that was chosen, on pinion and wheel [um]."""
+        """Amounts of the chosen variant on pinion and wheel [um]."""
         first, second = (float(self.table.column(name)[self.best]) for name in AMOUNTS)
         return first, second
 
@@ -85,7 +85,7 @@ class ProfileLayout:
 
     @property
     def length(self) -> float | None:
-        """Of the tip relief of the variant that was chosen [mm]; None for profile crownings."""
+        """Length of the tip relief of the chosen variant [mm]; None for profile crownings."""
         return float(self.table.column(_LENGTH)[self.best]) if self.kind == "tip_relief" else None
 
     @property
@@ -107,7 +107,7 @@ class ProfileLayout:
         }
 
     def change(self, name: str) -> float:
-        """Of a result from no profile modification to the variant that was chosen, relative [%]."""
+        """Relative change of a result from no profile modification to the chosen variant [%]."""
         values = self.table.column(name)
         return 100.0 * float(values[self.best] / values[0] - 1.0)
 
@@ -212,7 +212,7 @@ def flank_line_contact(
     deviations: Iterable[Given] = (0.0,),
     kind: Kind = "tip_relief",
 ) -> dict[str, Float[np.ndarray, " deviations"]]:
-    """What the loaded tooth contact says of flank lines without profile modifications, NaN where it fails.
+    """Contact analysis results of flank lines without profile modifications; NaN where it fails.
 
     `RESULTS`, and of helical pairs the length of contact of tip corners.
 
@@ -231,7 +231,7 @@ def flank_line_contact(
 
 
 def _lengths(pair: GearPair, kind: Kind, given: float | Sequence[float] | None) -> tuple[float, ...]:
-    """Of the tip reliefs that are tried [mm]; none for profile crownings."""
+    """Lengths of the tip reliefs to try [mm]; empty for profile crownings."""
     if kind == "profile_crowning":
         return ()
     lengths = np.atleast_1d(np.asarray(long_relief_length(pair) if given is None else given, float))

@@ -77,7 +77,7 @@ class FlankLineLayout(Checked):
 
     @property
     def modifications(self) -> tuple[AbstractModification, AbstractModification]:
-        """Of pinion and wheel after step 2."""
+        """Modifications of pinion and wheel after step 2."""
         return self.pinion.modification, self.wheel.modification
 
     @property
@@ -242,5 +242,5 @@ def _further(needed: Scalar, given) -> Float[Array, "2"]:
 
 
 def without_housing(support: ShaftSupport) -> ShaftSupport:
-    """The same shafts on rigid seats."""
+    """Copy of the support with the bearings on rigid seats in place of the housing."""
     return replace(support, gearbox=replace(support.gearbox, housing=None))

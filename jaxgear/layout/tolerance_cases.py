@@ -94,7 +94,7 @@ def flank_line_tolerance(
 
 
 def _over_face(pair: GearPair, axes) -> list[Scalar]:
-    """What each deviation of the axes makes of the gap over the face [um]."""
+    """Gap over the face by each deviation of the axes [um]."""
     if axes is None:
         return [jnp.zeros(())]
     if not isinstance(axes, Misalignment):

@@ -1,4 +1,4 @@
-"""What a gear measuring machine shows: traces of a flank, their evaluation range and tolerance band, deviations.
+"""Charts of a gear measuring machine: traces of a flank, their evaluation range and tolerance band, deviations.
 
 Sign of the machines: deviations are normal to the flank and positive for excess material, so a relief is negative;
 modifications count the material removed. The nominal involute is the zero line.
@@ -109,7 +109,7 @@ def flank_place(side: Side, roll_length: Float[Array, "..."]) -> FlankPlace:
 
 
 def start_of_relief(side: Side, modification: AbstractModification) -> FlankPlace:
-    """Where the relief of the tip starts (`relief_start`)."""
+    """Start of the tip relief on the flank (`relief_start`)."""
     return flank_place(side, relief_start(side, modification))
 
 
@@ -258,7 +258,7 @@ def _between(place: Points, low: Scalar, high: Scalar) -> Bool[Array, " points"]
 
 
 def _band(values: Points, inside: Marks, counted: Marks) -> Scalar:
-    """From the least of the values inside to the largest of those counted, which holds the ones inside."""
+    """Largest value of those counted, which include the ones inside, less the least of those inside."""
     first = values[jnp.argmax(inside)]
     return maximum(jnp.where(counted, values, first)) - minimum(jnp.where(inside, values, first))
 

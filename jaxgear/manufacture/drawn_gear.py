@@ -20,7 +20,7 @@ def drawn_gear(**given: Any) -> Gear:
     profile = _taken(given, ToothProfile)
     for name in profile:
         if profile[name] is not False and given.get(REPLACED[name]) is not None:
-            raise ValueError(f"ToothProfile: {name}: cannot stand beside {REPLACED[name]}: either says the other")
+            raise ValueError(f"ToothProfile: {name}: cannot be given with {REPLACED[name]}: give one of them")
     gear = _thick_gear(given)
     return with_profile(gear, ToothProfile(**profile)) if profile else gear
 

@@ -42,7 +42,7 @@ class ToothProfile(Checked):
 
     def check_together(self) -> None:
         if self.full_root_radius and self.root_form_diameter is not None:
-            raise ValueError("ToothProfile: full_root_radius: cannot stand beside root_form_diameter, which says it")
+            raise ValueError("ToothProfile: full_root_radius: cannot be given with root_form_diameter, give one")
 
 
 def with_profile(gear: Gear, profile: ToothProfile) -> Gear:

@@ -83,7 +83,7 @@ def _half_span(gear: Gear, length: Scalar) -> Scalar:
 
 
 def _across(gear: Gear, length: Scalar) -> Scalar:
-    """How much of the face a length across the teeth takes [mm]."""
+    """Length along the face that a length across the teeth takes [mm]."""
     return length * jnp.abs(jnp.sin(gear.base_helix_angle))
 
 
@@ -118,13 +118,13 @@ def _ball(gear: Gear, ball: Given) -> tuple[Scalar, Scalar, Scalar]:
 
 
 class Measures(NamedTuple):
-    """What the tooth thickness of a gear measures; lengths are NaN where anvils or balls miss the flanks.
+    """Measures of the tooth thickness; lengths are NaN where anvils or balls miss the flanks.
 
     Attributes:
-        teeth: k of the span.
-        span: W_k [mm].
-        ball: D_M [mm].
-        over_balls: M_dK [mm].
+        teeth: number k of teeth spanned.
+        span: base tangent length W_k [mm].
+        ball: ball diameter D_M [mm].
+        over_balls: dimension M_dK over two balls [mm].
     """
 
     teeth: Scalar
@@ -213,7 +213,7 @@ def _missing(tangent: Scalar, wanted: Scalar) -> Scalar:
 
 
 def _offset(gear: Gear) -> Scalar:
-    """What brings the two balls together where the number of teeth is odd."""
+    """Factor on the distance of the ball centres: cos(pi / (2 z)) for an odd number of teeth, else 1."""
     odd = jnp.mod(jnp.round(gear.teeth), 2) == 1
     return jnp.where(odd, jnp.cos(jnp.pi / (2 * gear.teeth)), 1.0)
 
@@ -271,9 +271,9 @@ _BESIDE = {"span": "teeth_spanned", "over_balls": "ball_diameter"}  # what a mea
 
 
 class ToothThickness(Checked):
-    """What a drawing says of the thickness of the teeth, in one of three ways.
+    """Tooth thickness on a drawing, given in one of three ways.
 
-    Every one of them is a number, or both limits [lower, upper]: the tooth is then that in the middle of both.
+    Each is a number, or both limits [lower, upper]: the tooth is then in the middle of them.
 
     Attributes:
         span: base tangent length W_k over `teeth_spanned` teeth [mm].
@@ -303,7 +303,7 @@ class ToothThickness(Checked):
         if not given:
             raise ValueError(f"ToothThickness: {WAYS[0]}: missing, give one of {', '.join(WAYS)}")
         if len(given) > 1:
-            problem = f"cannot stand beside {given[0]}: either says how thick the tooth is"
+            problem = f"cannot be given with {given[0]}: give one of them"
             raise ValueError(f"ToothThickness: {given[1]}: {problem}")
 
     def allowance(self, gear: Gear) -> Limits:
@@ -350,7 +350,7 @@ def _without_allowance(gear: Gear) -> Gear:
 
 
 def _named(name: str, found: Callable[[], Any], **beside: Any) -> Any:
-    """What is found, refused under the name of what was given, with the value of what was given beside it."""
+    """Result of `found()`; its errors are raised under the name of the drawing with the values of `beside`."""
     try:
         return found()
     except ValueError as error:

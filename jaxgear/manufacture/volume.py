@@ -1,4 +1,4 @@
-"""What is ground off a gear, beside the reliefs that industry grinds otherwise.
+"""Volume that finishing takes off a gear, and its ratio to that of reference reliefs.
 
 "Design for manufacturing of a spur gears profile modification based on the static transmission error for improving the
 dynamic behavior" (Int J Adv Manuf Technol 2023, doi 10.1007/s00170-023-12340-x, section 5, Fig. 22) compares the volume

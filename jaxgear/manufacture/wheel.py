@@ -24,7 +24,7 @@ from ..numerics import Checked, Given, check, concrete, minimum, number, program
 
 Profile = Float[Array, " points"]
 
-_POINTS = 201  # of a profile, where nobody asks for others
+_POINTS = 201  # of a profile, by default
 
 
 class SpaceFlank(NamedTuple):
@@ -235,5 +235,5 @@ def _end(side: Side, modification: AbstractModification) -> Scalar:
 
 
 def _depth(side: Side) -> Scalar:
-    """From the tip to the root circle [mm]."""
+    """Radial distance from the root to the tip circle [mm]."""
     return side.gear.tip_radius - side.gear.root_circle_radius

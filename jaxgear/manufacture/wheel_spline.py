@@ -197,7 +197,7 @@ def _check(degree: int, criterion: str) -> None:
 
 
 def _relief_length(modification: AbstractModification) -> Scalar | None:
-    """Of a tip relief that is all that shows along the profile; None for anything else."""
+    """Length of a tip relief [mm] that is the only modification along the profile; None for anything else."""
     parts = [part.modification if isinstance(part, Scaled) else part for part in terms(modification)]
     along = [part for part in parts if not isinstance(part, LeadCrowning | LeadSlope | EndRelief)]
     return along[0].length if len(along) == 1 and isinstance(along[0], TipRelief) else None

@@ -30,7 +30,7 @@ Several = list[One] | tuple[One, ...]
 
 
 class _Given(NamedTuple):
-    """What a design is analyzed from."""
+    """Inputs of one analysis: mesh, operating point, flanks, settings."""
 
     mesh: Mesh
     operating_point: OperatingPoint

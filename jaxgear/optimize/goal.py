@@ -1,4 +1,4 @@
-"""What is kept within limits: constraints on quantities and on free parameters."""
+"""Constraints on quantities and on free parameters."""
 
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -83,7 +83,7 @@ class Constraint(Checked):
 
     @property
     def sides(self) -> list[tuple[int, Scalar]]:
-        """Its limits, each with 1 for an upper and -1 for a lower one."""
+        """Limits, each with 1 for an upper and -1 for a lower one."""
         return [(sign, limit) for sign, limit in ((1, self.high), (-1, self.low)) if limit is not None]
 
     def margin(self, limit: Scalar, dtype: DTypeLike) -> Scalar | float:
@@ -95,7 +95,7 @@ class Constraint(Checked):
         return jnp.minimum(FEASIBLE, 0.25 * (self.high - self.low) / scale_of(limit, dtype)).astype(dtype)
 
     def excess(self, value: Scalar) -> list[Scalar]:
-        """By how much what is aimed at is missed at each limit, relative to the limit; negative inside."""
+        """Relative excess over each limit, counted from its `margin`; negative inside."""
         return [
             sign * (value - limit.astype(value.dtype)) / scale_of(limit, value.dtype) + self.margin(limit, value.dtype)
             for sign, limit in self.sides
@@ -103,6 +103,6 @@ class Constraint(Checked):
 
 
 def scale_of(limit: Scalar, dtype: DTypeLike) -> Scalar:
-    """What an excess over a limit is relative to."""
+    """Reference of a relative excess: size of the limit, 1 where it is zero."""
     limit = limit.astype(dtype)
     return jnp.where(limit == 0, 1.0, jnp.abs(limit)).astype(dtype)

@@ -1,4 +1,4 @@
-"""What flanks gave a measured transmission error: named unknowns with the uncertainty that the data leave."""
+"""Identification of flanks from a measured transmission error: named unknowns with their uncertainty."""
 
 from collections.abc import Mapping, Sequence
 from math import lcm
@@ -44,7 +44,7 @@ _OF_NOISE = 2 * (-np.log(0.05)) ** 0.5  # 95 % of amplitudes by Rayleigh's law, 
 
 
 class Identified(Checked):
-    """What the data say about the unknowns, besides the prior.
+    """Estimates of the unknowns from data and prior, with their uncertainty.
 
     Attributes:
         names: of the unknowns; those of the design, "torque_scale" and "offset" where they are unknown, then single
@@ -99,7 +99,7 @@ class Identified(Checked):
         return dict(zip(self.names, self.estimate[: self.own]))
 
     def not_told(self) -> list[str]:
-        """What the data cannot tell, a line per combination: of it the prior says more than they do."""
+        """Combinations of unknowns that the prior determines more than the data, a line for each."""
         lines, values, directions = [], np.asarray(self.singular_values), np.asarray(self.directions)
         of_pitch = np.sum(directions[:, self.own :] ** 2, axis=1) > _CHIEFLY
         for value, direction in zip(values[~of_pitch], directions[~of_pitch]):
@@ -163,16 +163,15 @@ class Identified(Checked):
 
 
 class _Problem(eqx.Module):
-    """What a fit searches.
+    """Unknowns of a fit and the model that they enter.
 
     Attributes:
         names: of the unknowns.
-        own: how many of them are not pitch deviations, the first.
-        turn: the unknowns, in their prior deviations, from independent ones of which pitch deviations have one less
-            per gear than there are teeth.
-        gaps: by how much the pairs of every window are apart, from those of the independent unknowns that are pitch
-            pitch deviations [um].
-        least_error: size of the shapes of the error of the model.
+        own: number of unknowns, the first ones, that are not pitch deviations.
+        turn: matrix from independent unknowns to all, both in prior deviations; of the pitch deviations of a gear one
+            less is independent than there are teeth.
+        gaps: separation of the pairs of every window per unit of each independent pitch deviation [um].
+        least_error: least size of the shapes of the error of the model.
     """
 
     design: Design
@@ -431,7 +430,7 @@ def _closed(teeth: int) -> Float[np.ndarray, "teeth independent"]:
 
 
 def _gaps(mesh: Mesh, windows: np.ndarray, counts: Sequence[int], spreads: Sequence[float | None]) -> Array:
-    """As of `_Problem`: cumulative pitch deviations, around their mean, of both teeth of every pair."""
+    """Gaps of `_Problem`: cumulative pitch deviations, around their mean, of both teeth of every pair."""
     numbers = windows[:, None] + pairs_in_window(mesh.resolution)
     found = [jnp.zeros((*numbers.shape, 0), mesh.slice_width.dtype)]
     for gear, count, spread in zip(mesh.pair.gears, counts, spreads):

@@ -52,7 +52,7 @@ class IteratedFlanks:
         self._extra = [np.zeros_like(self._path), np.zeros_like(self._path)]
 
     def modifications(self, slant: float = 0.0) -> tuple[AbstractModification, AbstractModification]:
-        """Of pinion and wheel, with the material removed slanted towards the tips."""
+        """Modifications of pinion and wheel, with the material removed slanted towards the tips."""
         made = []
         for index, (given, roll) in enumerate(zip(self._start, self._roll)):
             before = self._given[index]
@@ -127,7 +127,7 @@ class Pressure:
         return max(float(np.max(np.asarray(of.contact_pressure) + np.asarray(of.corner_pressure))) for of in cycles)
 
     def excess(self, pressure: float) -> float:
-        """By how much of the limit a pressure misses what is aimed at; 0 without a limit."""
+        """Relative excess of a pressure over the limit, counted from its margin; 0 inside or without a limit."""
         return 0.0 if self.limit is None else max(0.0, *map(float, self.limit.excess(jnp.asarray(pressure))))
 
     def passed(self, pressure: float) -> float:

@@ -43,7 +43,7 @@ class Linearizer:
         self._parts = [problem.on(mesh) for mesh in meshes] if len(meshes) > 1 else [problem]
 
     def on(self, problem: Problem) -> "Linearizer":
-        """That of the same problem on another mesh, by the same program if there can be one."""
+        """Linearizer of the problem on another mesh, in parts of as many positions to reuse the program."""
         return Linearizer(problem, self.batch, self._positions)
 
     def __call__(self, points: np.ndarray) -> list[Linearization]:
@@ -63,7 +63,7 @@ class Linearizer:
         ]
 
     def _at_parts(self, points: np.ndarray) -> list[list[Linearization]]:
-        """At every point, the linearizations on each of the meshes."""
+        """Linearizations on each of the meshes, for every point."""
         found = []
         for part in self._parts:
             rows = _linearizations(part, real_points(part, padded(points, self.batch)), np.asarray(len(points)))
@@ -90,7 +90,7 @@ def _together(each: tuple[Pieces, ...]) -> Pieces:
 
 @kernel
 def _linearizations(problem: Problem, points, count) -> Linearization:
-    """At the first `count` points; what stands in the other rows means nothing."""
+    """Linearizations at the points; rows beyond the first `count` may be arbitrary."""
     if jax.default_backend() != "cpu":  # an accelerator needs all of them to be busy
         return jax.vmap(problem.linearize)(points)
     # one point after the other: as quick on a processor, whose cores a single analysis keeps busy, and compiled in half
@@ -137,7 +137,7 @@ class AbstractScalarization(ABC):
         """Factor and offset of every objective."""
 
     def join(self, values: np.ndarray) -> np.ndarray:
-        """The one number, objectives on the last axis."""
+        """Scalarized value of the objectives on the last axis."""
         factor, offset = self.scales()
         scaled = factor * values + offset
         return scaled.max(axis=-1) + self.part * scaled.sum(axis=-1)
@@ -197,7 +197,7 @@ class LinearModel:
 
     @property
     def value(self) -> float:
-        """The one number at the point, with the penalty of the roughness."""
+        """Scalarized objective at the point with the penalty of the roughness; inf if not converged."""
         if not self.fine:
             return np.inf
         rough = np.abs(self._forms @ self._x).max(initial=0.0)
@@ -375,7 +375,7 @@ class _Program:
         for column, value in cost.items():
             coefficients[column] = value
         lowest = [-np.inf if bound is None else bound for bound in self._lows]
-        # a linear program is a mixed-integer one without integers: the same solver with half the ado
+        # a mixed-integer program without integers: the solver of `linprog` with less overhead
         found = scipy.optimize.milp(
             coefficients,
             constraints=scipy.optimize.LinearConstraint(matrix, -np.inf, np.concatenate(self._limits)),

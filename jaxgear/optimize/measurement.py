@@ -76,9 +76,9 @@ class Bins(NamedTuple):
     Attributes:
         torques: ascending, shape (torques,).
         level: number of the torque of every bin that has readings.
-        place: mean mesh position of its readings, in positions of the mesh from the first.
+        place: mean mesh position of the readings of every bin, in positions of the mesh from the first.
         row: bin of every reading.
-        readings: of every bin, their number.
+        readings: number of readings of every bin.
     """
 
     torques: np.ndarray
@@ -88,7 +88,7 @@ class Bins(NamedTuple):
     readings: np.ndarray
 
     def mean(self, of: Array) -> Array:
-        """Of the readings of every bin."""
+        """Mean over the readings of every bin."""
         return jnp.zeros(len(self.level), of.dtype).at[self.row].add(of) / self.readings.astype(of.dtype)
 
 
@@ -105,7 +105,7 @@ def bins_of(measurement: Measurement, positions: int, first: float, period: int 
 
 
 def noise_of(measurement: Measurement, bins: Bins) -> Scalar:
-    """As `Measurement.noise_on`."""
+    """Standard deviation of a reading [um], see `Measurement.noise_on`."""
     if measurement.noise is not None:
         return measurement.noise
     value, free = measurement.transmission_error, len(bins.row) - len(bins.level)
@@ -139,7 +139,7 @@ class Data(eqx.Module):
     noise: Rows
 
     def at(self, of: Float[Array, "torques places *columns"]) -> Float[Array, "rows *columns"]:
-        """At the readings, between positions of the mesh by a straight line."""
+        """Values at the readings, linearly interpolated between positions of the mesh."""
         first, second = of[self.level, self.before], of[self.level, self.after]
         return first + self.share.reshape(-1, *[1] * (first.ndim - 1)) * (second - first)
 
@@ -201,12 +201,12 @@ class Errors(NamedTuple):
         return of - self.shapes @ along, along
 
     def whitened(self, size: Scalar, of: Float[Array, "rows columns"]) -> Float[Array, "sums columns"]:
-        """As independent sums of readings in standard deviations."""
+        """Columns of readings as independent sums, in standard deviations."""
         outside, along = self.split(of)
         return jnp.concatenate([outside, along / self._deviation(size)])
 
     def products(self, of: Float[Array, "rows columns"]) -> Callable[[Scalar], Float[Array, "columns columns"]]:
-        """Of all columns of `whitened` with each other, by the size of the error of the model."""
+        """Products of all columns of `whitened` with each other, as a function of the size of the model error."""
         outside, along = self.split(of)
         square = outside.T @ outside
 

@@ -104,7 +104,7 @@ class Met:
     def compromise(self) -> tuple[np.ndarray, float]:
         """The design whose worst distance from the ideal, in spans of the front, is about the least; and that distance.
 
-        The part of the sum decides between designs that hardly differ in the worst.
+        The sum decides between designs of nearly the same worst distance.
         """
         if not self.found:
             return np.full(self._points.shape[1], 0.5), np.inf
@@ -130,7 +130,7 @@ class Met:
     def thin(self, most: int) -> None:
         """Keeps at most so many designs: the best of every objective, the compromise, and ever the farthest from those.
 
-        A design that hardly differs from a kept one goes.
+        Designs within `_NEAR` of a kept one are dropped.
         """
         scaled = (self._values - self._low) / self._span
         compromise = int(np.abs(self._points - self.compromise()[0]).max(axis=1).argmin())

@@ -110,7 +110,7 @@ class Problem(eqx.Module):
         return f"Problem: {what} of {', '.join(self.names)} in {self.cases.count} cases, {len(self.constraints)} limits"
 
     def on(self, mesh: Mesh) -> "Problem":
-        """The same problem on another mesh."""
+        """Copy of the problem on another mesh."""
         return replace(self, mesh=mesh, cases=self.conditions.on(mesh))
 
     @property
@@ -179,7 +179,7 @@ class Problem(eqx.Module):
     def soft_and_true(
         self, x: Vector, width: Scalar
     ) -> tuple[Float[Array, " objectives"], Float[Array, " objectives"], Float[Array, " limits"], Bool[Array, ""]]:
-        """What gradient methods need of one analysis.
+        """Soft and true objectives and excesses from one analysis, for gradient methods.
 
         Args:
             x: point of the unit box.
@@ -303,7 +303,7 @@ def make_problem(
     seed: int = 0,
     owner: str = "minimize",
 ) -> Problem:
-    """Checks and collects a problem; the arguments are those of `minimize`, and who asks, for messages.
+    """Checked problem from the arguments of `minimize`; `owner` is the name of the caller, for messages.
 
     Raises:
         ValueError: for empty or reversed bounds, unknown names of objectives or constrained parameters, and whatever

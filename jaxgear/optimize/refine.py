@@ -93,7 +93,7 @@ def on_finer_meshes(owner: str, mesh: Mesh, positions: int, end_on: Callable[[Me
     there, too.
 
     Args:
-        owner: who asks, for messages.
+        owner: name of the caller, for messages.
         mesh: of the search.
         positions: of the first finer mesh, at least those of the mesh.
         end_on: ends the search on a finer mesh; tells what it has found and whether that mesh is fine enough.
@@ -159,7 +159,7 @@ def _left_by_slices(record: Record) -> float:
 
 
 def _kept_to_limits(record: Record, polish: Polish) -> None:
-    """Where no design so far keeps the limits, seeks one by their violation alone, and goes on from it."""
+    """Seek a design that keeps the limits if none does so far, by their violation alone, and polish it."""
     if not counted(record.violation):
         return
     linearizer = record.linearizer or Linearizer(record.problem, _NEAR + _FAR)
@@ -196,7 +196,7 @@ class _Judging:
 
 
 def _with_positions(mesh: Mesh, positions: int) -> Mesh:
-    """The same mesh at other positions."""
+    """Copy of the mesh with another number of positions."""
     if positions == mesh.resolution.positions:
         return mesh
     sizes = replace(mesh.resolution, positions=positions)

@@ -1,4 +1,4 @@
-"""What every optimization returns."""
+"""Results of optimizations."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""What a method of optimization is, the record that it keeps, where it starts, and true scores of many designs."""
+"""Base class of optimization methods, their record and start points, and true scores of many designs."""
 
 from abc import abstractmethod
 
@@ -17,7 +17,7 @@ from .problem import Problem, Score, real_points
 
 
 class Record:
-    """The best design met so far, what it cost, and who wants to know.
+    """Best design so far, contact analyses spent, and the callback that is told.
 
     A design that keeps the constraints beats one that does not; among those that do not, the least violation wins.
     """
@@ -101,7 +101,7 @@ class AbstractMethod(eqx.Module):
     @property
     @abstractmethod
     def name(self) -> str:
-        """As design files and tables call it."""
+        """Name in design files and tables."""
 
     @abstractmethod
     def search(self, problem: Problem, record: Record) -> None:

@@ -69,13 +69,13 @@ class SLP(Checked, AbstractMethod):
 
 
 class Ledger(Protocol):
-    """Who keeps the designs of a search; a `Record` is one."""
+    """Interface to the record of a search, such as `Record`."""
 
     def spend(self, designs: int, *, analyses: int) -> None:
         """Counts contact analyses."""
 
     def take(self, point: np.ndarray, model: LinearModel) -> None:
-        """Is told of a design."""
+        """Takes a design with its linearization."""
 
     def look(self, step: int, steps: int) -> None:
         """Marks the progress before a step."""
@@ -98,7 +98,7 @@ class Search:
 
     @property
     def penalty(self) -> float | None:
-        """Of a violation, the same all the way."""
+        """Penalty factor of a relative violation, constant over the search; None before its first point."""
         return None if self._model is None else self._model.penalty
 
     def propose(self, rtol: float) -> bool:
@@ -107,7 +107,7 @@ class Search:
             return False
         step, self._predicted = self._model.best_step(self._radius)
         self.trial = self._point + step
-        # a violation that nobody notices is worth no step either
+        # a decrease of the violation below the tolerance on it is not worth a step either
         moves = self._predicted > rtol * max(abs(self._model.value), FEASIBLE * self._model.penalty)
         self._ended = None if moves else rtol
         return moves

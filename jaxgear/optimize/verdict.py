@@ -1,4 +1,4 @@
-"""What is said about the best design of a search, and a second opinion by finite elements."""
+"""Result of a search from its best design, and verification by finite elements."""
 
 import time
 from collections.abc import Mapping, Sequence
@@ -109,7 +109,7 @@ def _optimality(record: Record) -> float:
 
 
 def objective_name(problem: Problem) -> str:
-    """What is minimized, in words."""
+    """Name of the minimized number."""
     names = [of.name for of in problem.objectives]
     if len(names) > 1:
         return f"distance from the ideal of {' and '.join(names)}"
@@ -119,9 +119,9 @@ def objective_name(problem: Problem) -> str:
 def judged(
     problem: Problem, pinion: AbstractModification | None = None, wheel: AbstractModification | None = None
 ) -> dict[str, float]:
-    """What any modifications are worth in a problem: its objectives, by name and unit as "95 % CVaR of ppte [um]".
+    """Objectives of a problem for any modifications, by name and unit as "95 % CVaR of ppte [um]".
 
-    They are joined by its measure over its cases; infinite where a contact solution failed. No penalty is added.
+    Joined by the measure over the cases; infinite where a contact solution failed. No penalty is added.
     """
     if _is_single(problem):
         cycle, mesh = _single(problem, problem.objectives, pinion, wheel)
@@ -222,13 +222,13 @@ def _active_bounds(names, x) -> dict[str, str]:
 
 
 class Verified(eqx.Module):
-    """What a design is worth by one model of the structure and by finite elements, all else being equal.
+    """PPTE and objectives of a design by one structure model and by finite elements, all else being equal.
 
     Attributes:
         claimed: PPTE by the structure of the mesh [um].
         ppte: PPTE by the finite-element structure [um]; infinite where a contact solution failed.
-        claimed_objectives: what a search made small, by name and unit; empty where it levelled a curve.
-        objectives: the same by the finite-element structure, by the same measure over the same cases.
+        claimed_objectives: objectives of the search, by name and unit; empty where a curve was levelled.
+        objectives: objectives by the finite-element structure, by the same measure over the same cases.
         cycle: mesh cycle by the finite-element structure.
     """
 
@@ -268,7 +268,7 @@ class Verification:
 
 
 def verification(mesh: Mesh, compliance: TabulatedCompliance, problem: Problem | None = None) -> Verification:
-    """What evaluates designs of a mesh with tables of its gears.
+    """Verification of designs of a mesh with finite-element tables of its gears.
 
     Args:
         mesh: prepared mesh, by whose structure the numbers are claimed.

@@ -1,4 +1,4 @@
-"""What a revolution comes to: orders of the shafts, composite errors, the load on every tooth.
+"""Results of a revolution: orders of the shafts, composite errors, the load on every tooth.
 
 References:
     ISO 1328-1:1995 on the tangential composite deviation F'_i, the range over a whole revolution, and the

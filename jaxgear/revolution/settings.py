@@ -59,7 +59,7 @@ class Teeth(AbstractSettings):
 
     @property
     def deviations(self) -> tuple[TeethDeviations | None, TeethDeviations | None]:
-        """Of pinion and wheel."""
+        """Deviations of the teeth of pinion and wheel; None for equal teeth."""
         return self.pinion, self.wheel
 
     def counts_of(self, pair: GearPair) -> tuple[int, int]:

@@ -48,7 +48,7 @@ class Revolution(WithStatus, eqx.Module):
 
     @property
     def status(self) -> Array:
-        """Of every place, see `MeshCycle`, shape (places,)."""
+        """Status at every place, see `MeshCycle`, shape (places,)."""
         return _joined(self.cycles.status)
 
     @property
@@ -64,17 +64,17 @@ class Revolution(WithStatus, eqx.Module):
 
     @property
     def transmission_error(self) -> Curve:
-        """As of a mesh cycle [um], shape (places,)."""
+        """Transmission error, see `MeshCycle` [um], shape (places,)."""
         return _joined(self.cycles.transmission_error)
 
     @property
     def unloaded_transmission_error(self) -> Curve:
-        """As of a mesh cycle [um], shape (places,)."""
+        """Unloaded transmission error, see `MeshCycle` [um], shape (places,)."""
         return _joined(self.cycles.unloaded_transmission_error)
 
     @property
     def tangent_stiffness(self) -> Curve:
-        """As of a mesh cycle [N/um], shape (places,)."""
+        """Tangent stiffness, see `MeshCycle` [N/um], shape (places,)."""
         return _joined(self.cycles.tangent_stiffness)
 
     @property
@@ -196,7 +196,7 @@ def _cycles(kinematics: Kinematics, margins: Margins, at: OperatingPoint, found:
 def _contacts(
     mesh: Mesh, at: OperatingPoint, flanks: Flanks, deviations: Deviations, counts: tuple[int, int], windows: int
 ) -> dict[str, Array]:
-    """What differs between the cycles of the windows."""
+    """Contact results and status of every window, leading axis (windows,)."""
     dtype, sizes = mesh.slice_width.dtype, mesh.resolution
     deviations = jax.tree.map(lambda leaf: leaf.astype(dtype) if eqx.is_inexact_array(leaf) else leaf, deviations)
     # without teeth of their own shape the material is the same in all windows, but for a displacement of every pair
@@ -234,7 +234,7 @@ def displaced(mesh: Mesh, at: Torque, removed: RemovedMaterial, pitch: Array) ->
 
 
 def _displacement(mesh: Mesh, deviations: Deviations, counts: tuple[int, int], numbers: Array) -> Float[Array, " n"]:
-    """By how much the pairs are apart by their pitch deviations [um]."""
+    """Separation of the pairs by their pitch deviations [um], shape (n,)."""
     total = jnp.zeros(numbers.shape, mesh.slice_width.dtype)
     for gear, of, count in zip(mesh.pair.gears, deviations, counts):
         if of is not None:
@@ -243,7 +243,7 @@ def _displacement(mesh: Mesh, deviations: Deviations, counts: tuple[int, int], n
 
 
 def _own(mesh: Mesh, deviations: Deviations, counts: tuple[int, int], numbers: Array) -> Flanks:
-    """What the teeth of every pair have of their own, for `slid_material`."""
+    """Modifications of the teeth of every pair besides their pitch deviations, for `material_of`."""
 
     def of_gear(gear: Gear, of: TeethDeviations | None, count: int, direction: float) -> Any:
         of = TeethDeviations(jnp.zeros(count, mesh.slice_width.dtype)) if of is None else of
@@ -254,7 +254,7 @@ def _own(mesh: Mesh, deviations: Deviations, counts: tuple[int, int], numbers: A
 
 
 def _status(mesh: Mesh, cycle: MeshCycle, removed: Any, pitch: Array) -> Array:
-    """That of a cycle, where the next pairs behind and ahead may be displaced against those at the edges."""
+    """Status of a cycle; the next pairs behind and ahead may be displaced against those at the edges."""
     apart = jnp.minimum(jnp.minimum(pitch[0] - pitch[1], pitch[-1] - pitch[-2]), 0.0)
     windup = mesh.hub * cycle.force / mesh.pair.face_width
     error = cycle.transmission_error - windup - mesh.support_deflection(cycle.line_load)

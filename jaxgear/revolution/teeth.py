@@ -1,4 +1,4 @@
-"""By how much the teeth of a gear differ from each other.
+"""Deviations of the single teeth of a gear from each other.
 
 Teeth are counted in the order in which they come into mesh: pair n is tooth n mod z1 of the pinion on tooth n mod z2
 of the wheel. Deviations are positive where material is missing, like modifications. A measuring report that counts
@@ -207,12 +207,12 @@ class TeethDeviations(Checked):
         return self.flanks is not None or bool(self.undulations)
 
     def of_tooth(self, tooth: Array, gear: Gear, direction: float) -> AbstractModification:
-        """What is removed from one tooth besides its pitch deviation.
+        """Modification of one tooth besides its pitch deviation.
 
         Args:
-            tooth: its number.
+            tooth: number of the tooth.
             gear: the gear.
-            direction: 1 of the pinion, -1 of the wheel.
+            direction: 1 for the pinion, -1 for the wheel.
         """
         found: list[AbstractModification] = []
         if self.flanks is not None:

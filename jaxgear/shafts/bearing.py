@@ -15,7 +15,7 @@ Matrix = Float[Array, "5 5"]
 
 
 class AbstractBearing(Checked):
-    """What holds a shaft at a place; its other side sits on the housing, or on rigid ground where there is none."""
+    """Support of a shaft at one position, mounted on the housing, or on rigid ground where there is none."""
 
     name: eqx.AbstractVar[str]
     position: eqx.AbstractVar[Scalar]

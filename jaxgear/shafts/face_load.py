@@ -161,7 +161,7 @@ def annex_e(
 
 @program
 def _removed(pair: GearPair, pinion: AbstractModification, wheel: AbstractModification, stations: int) -> Slices:
-    """By both flanks [um]; apart from the load, whose longer program then serves modifications of any kind."""
+    """Material removed by both flanks [um]; a program of its own, so that one for the load serves all kinds."""
     y = even_coordinates(pair.face_width, stations)
     amount = sum(item(flank) for item, flank in zip((pinion, wheel), pitch_lines(pair, y)))
     return jnp.broadcast_to(amount, y.shape)

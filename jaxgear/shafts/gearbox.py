@@ -151,7 +151,7 @@ class Gearbox(Checked):
 
     @property
     def bearing_names(self) -> tuple[str, ...]:
-        """Of all shafts, in their order."""
+        """Names of the bearings of all shafts, in the order of the shafts."""
         return tuple(bearing.name for shaft in self.shafts for bearing in shaft.bearings)
 
     @property

@@ -1,4 +1,4 @@
-"""What shafts, bearings and housing do to the gap of a mesh over its face."""
+"""Gap of a mesh over its face due to shafts, bearings and housing."""
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -49,12 +49,12 @@ class RigidSupport(AbstractSupport):
         return jnp.zeros((len(y), len(y)))
 
     def gap(self, y: Slices) -> Slices:
-        """That of the misalignment [um]."""
+        """Gap due to the misalignment [um]."""
         return self.misalignment.over_face(self.pair) * real(y) / self.pair.face_width
 
 
 class TabulatedSupport(AbstractSupport):
-    """What another program, or a measurement, tells about the face; it holds at every torque.
+    """Support given as a table by another program or a measurement; the same at every torque.
 
     Attributes:
         gears: the pair.
@@ -150,12 +150,12 @@ class ShaftSupport(AbstractSupport):
 
     @property
     def torque(self) -> Scalar:
-        """On the pinion [N m]."""
+        """Torque on the pinion [N m]."""
         return self.gearbox.pinion_torques()[self.mesh]
 
     @property
     def status(self) -> Statuses:
-        """That of the gearbox."""
+        """Status of the gearbox."""
         return self.gearbox.status
 
     def influence(self, y: Slices) -> Float[Array, "slices slices"]:
@@ -167,12 +167,12 @@ class ShaftSupport(AbstractSupport):
         return _influence(self, real(y))
 
     def gap(self, y: Slices) -> Slices:
-        """What other meshes, external loads and misalignment open, the force of other meshes even over their faces."""
+        """Gap due to misalignment, external loads and other meshes with forces even over their faces [um]."""
         return _gap(self, real(y))
 
 
 def support(gearbox: Gearbox, mesh: int = 0) -> ShaftSupport:
-    """What the shafts do to a mesh of a gearbox.
+    """Support of a mesh by the shafts of a gearbox.
 
     Args:
         gearbox: shafts, meshes, housing.

@@ -103,7 +103,7 @@ class ShaftLoad(Checked):
 
     @property
     def vector(self) -> Float[Array, "5"]:
-        """In x, y, z, rx, ry [N, N mm]."""
+        """Force and moment in x, y, z, rx, ry [N, N mm]."""
         return jnp.concatenate([self.force, 1e3 * self.moment])
 
 
@@ -180,7 +180,7 @@ class Shaft(Checked):
 
     @property
     def valid(self) -> Bool[Array, ""]:
-        """Whether such a shaft can be; concrete ones that cannot are refused, traced ones flagged."""
+        """True if the shaft passes its checks; concrete shafts that do not are refused, traced ones flagged."""
         return _holds(facts_of(self))
 
     def _named(self) -> tuple[tuple[str, str], ...]:
@@ -206,19 +206,19 @@ class ShaftError(ValueError):
 
 
 class ShaftFacts(NamedTuple):
-    """What a shaft is judged by; one rule decides what of concrete numbers is refused and of traced ones not valid.
+    """Numbers by which a shaft is checked: errors of concrete numbers, status of traced ones.
 
     Attributes:
         length: of the shaft [mm].
         low, high: ends of everything on it [mm].
-        inside: of everything on it, whether it lies within the shaft.
-        hollow: of every section, whether its bore is less than its diameter.
+        inside: for every item, True if it lies within the shaft.
+        hollow: for every section, True if its bore is less than its diameter.
         thinnest, thickest: smallest and largest diameter of the sections under the face of every gear [mm].
-        body: its body diameter, 0 where it has none [mm].
-        tip: its tip diameter [mm].
-        overlap: whether the faces of two gears have more than an end in common.
-        held: whether the bearings resist every movement but that along the axis.
-        axial: whether they resist that too where something pushes, as helical gears do.
+        body: body diameter of every gear, 0 where it has none [mm].
+        tip: tip diameter of every gear [mm].
+        overlap: True if the faces of two gears have more than an end in common.
+        held: True if the bearings resist every rigid movement in x, y, rx, ry.
+        axial: True if the bearings resist axial movement, or if neither loads nor helical gears push axially.
     """
 
     length: Scalar
@@ -285,7 +285,7 @@ def _resists(stiffness: Float[Array, "4 4"]) -> Bool[Array, ""]:
 
 
 def _holds(facts: ShaftFacts) -> Bool[Array, ""]:
-    """Whether such a shaft can be."""
+    """True if all checks of the facts pass."""
     fits = jnp.maximum(facts.thickest, facts.body) < facts.tip
     several = jnp.all(facts.inside) & jnp.all(facts.hollow) & jnp.all(fits) & ~jnp.any(facts.overlap)
     return several & facts.held & facts.axial

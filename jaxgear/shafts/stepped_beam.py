@@ -30,7 +30,7 @@ _Matrix = TypeVar("_Matrix", jax.Array, np.ndarray)
 
 
 def symmetric(matrix: _Matrix) -> _Matrix:
-    """Its symmetric part: derivatives see both entries of a pair."""
+    """Symmetric part of a matrix: derivatives see both entries of a pair."""
     return 0.5 * (matrix + matrix.T)
 
 

@@ -1,4 +1,4 @@
-"""What manufacturing deviations make of a design: tolerances and random deviations between them.
+"""Manufacturing deviations of a design: tolerances, and random deviations within them.
 
 Deviations are material removed in um like every modification: positive into the flank, of either sign. Slopes turn
 about the middle of the profile or the face, as `ProfileSlope` and `LeadSlope` do, and the waviness has neither mean nor

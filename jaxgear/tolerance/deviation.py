@@ -178,7 +178,7 @@ def flank_basis(mesh: Mesh, torque: Torque) -> Float[Array, "terms pairs slices 
 
 
 def _coefficients(deviation: Deviation) -> Float[Array, " terms"]:
-    """In the order of `flank_basis`."""
+    """Coefficients of the deviation in the order of `flank_basis`."""
     pinion, wheel = deviation.pinion, deviation.wheel
     profiles = [part for gear in (pinion, wheel) for part in (gear.profile_slope[None], gear.waviness)]
     leads = jnp.stack([pinion.helix_slope, wheel.helix_slope, deviation.misalignment])

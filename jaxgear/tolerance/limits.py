@@ -227,7 +227,7 @@ class Tolerance(Checked):
         )
 
     def without_lead(self) -> "Tolerance":
-        """The same tolerance without helix slopes and misalignment, for a mesh of one slice."""
+        """Copy of the tolerance without helix slopes and misalignment, for a mesh of one slice."""
         return replace(
             self,
             pinion=replace(self.pinion, helix_slope=None),

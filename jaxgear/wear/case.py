@@ -134,7 +134,7 @@ class OfLubrication(eqx.Module):
 
 
 def wear_law(coefficient: Coefficient, loads: OperatingPoint, dtype: np.dtype) -> Constant | OfLubrication:
-    """What gives the coefficient of both gears at every contact of a cycle, (gears, pairs, slices, positions).
+    """Wear coefficient of both gears as a function of a cycle [m2/N], for (gears, pairs, slices, positions).
 
     Raises:
         ValueError: for negative coefficients, more than two, and a function where the loads have no speed.
@@ -182,11 +182,11 @@ def points_for(positions: int) -> int:
 
 
 class Case(eqx.Module):
-    """What wears, and under what.
+    """Inputs of a wear analysis.
 
     Attributes:
         mesh: prepared mesh.
-        loads: with a leading axis (torques,).
+        loads: operating points, with a leading axis (torques,).
         weights: shares of the revolutions, shape (torques,); None under one torque.
         law: coefficient of wear of both gears at the contacts of a cycle.
         pinion, wheel: modifications of the new flanks.
@@ -240,7 +240,7 @@ class Case(eqx.Module):
         return {"pinion": self.pinion + pinion, "wheel": self.wheel + wheel}
 
     def _rate(self, cycle: MeshCycle, place: Deposit) -> tuple[Depth, Statuses]:
-        """What one passage wears off, and whether the coefficient is valid."""
+        """Wear depth of one passage [um], and the status of the coefficient: out of validity below 0 or NaN."""
         coefficient = self.law(cycle)
         # a function may give anything: no flank is known that NaN or a negative coefficient has worn
         valid = jnp.all(coefficient >= 0)
@@ -313,7 +313,7 @@ class Case(eqx.Module):
         return jnp.where(solved(cycles), jax.lax.map(on, (marched.depth, cycles)), jnp.nan)
 
     def dynamic_factor(self, marched: March) -> Float[Array, "steps *torques"] | None:
-        """At all time steps of a march, as its `cycles`; None without dynamics."""
+        """Dynamic factor at all time steps of a march, axes as those of `cycles`; None without dynamics."""
         if self.vibration is None:
             return None
         found = jnp.where(marched.status[:, None] == Status.CONVERGED, marched.seen[_DYNAMIC_FACTOR], jnp.nan)

@@ -88,7 +88,7 @@ class WearHistory(WithStatus, Checked):
         return pinion, wheel
 
     def flanks(self, step: int = -1) -> tuple[AbstractModification, AbstractModification]:
-        """What is worn off pinion and wheel, as modifications: `TabulatedProfile`, or `TabulatedFlank` over slices.
+        """Wear depth of pinion and wheel as modifications: `TabulatedProfile`, or `TabulatedFlank` over slices.
 
         They add to the modifications of the new flanks. Interpolated linearly, they hold the worn volume.
 

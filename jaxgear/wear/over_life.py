@@ -142,7 +142,7 @@ def _single(owner: str, history: WearHistory) -> None:
 
 @quick_jit
 def _reached(done: Steps, values: Steps, limit: Scalar, *, goes_on: bool) -> Scalar:
-    """Where values first exceed a limit."""
+    """Revolutions at which values first reach a limit, 0 at the start; infinite or extrapolated if they never do."""
     # written so that NaN counts as reached, and is what comes out
     beyond = ~(values < limit)
     last = len(done) - 2

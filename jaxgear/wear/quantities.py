@@ -18,8 +18,8 @@ from .history import WearHistory
 from .over_life import life_to, life_to_depth, mean_over_life, over_life, pressure_error, wear_depth
 from .settings import Wear
 
-# A limit that is never reached is no failure, which not finite values of a quantity are. Nothing is known of the
-# transmission error beyond the life that was looked at; the depth goes on, but so far nobody extrapolates.
+# Longest life to a wear depth that is reported, in analyzed lives: a limit that is never reached is no failure, but a
+# value that is not finite counts as one. The transmission error is not extrapolated beyond the analyzed life.
 MOST_LIVES = 1000.0
 # Blocks are too long, and flanks overshoot from one to the next, where the error is estimated at more than this share
 # of the depth, or a block wears off more than so many deflections of the new teeth under their load (see `wear`). The
@@ -34,7 +34,7 @@ def _at_most(longest, history):
 
 
 def _pressure_error(history: WearHistory):
-    """By how much the largest pressure of a life may be larger [MPa]; that at tip corners depends on no grid."""
+    """Estimated error of the largest pressure of a life [MPa]; none at tip corners, which depend on no grid."""
     largest = over_life(history, "max_contact_pressure")
     may_be = jnp.maximum(largest, over_life(history, "max_flank_pressure") + pressure_error(history))
     return maximum(may_be) - maximum(largest)

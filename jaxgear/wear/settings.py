@@ -1,4 +1,4 @@
-"""What a mesh is worn by: revolutions, coefficients of wear and limits, and the quantities that are made of them."""
+"""Settings of wear: revolutions, wear coefficients and limits, and the quantities that are made of them."""
 
 from typing import Any
 
@@ -67,7 +67,7 @@ class Wear(AbstractSettings):
 
     @property
     def coefficients(self) -> Float[Array, " gears"]:
-        """Of pinion and wheel [m2/N]."""
+        """Wear coefficients of pinion and wheel [m2/N], shape (gears,)."""
         wheel = self.coefficient if self.wheel_coefficient is None else self.wheel_coefficient
         return jnp.stack([self.coefficient, wheel])
 

@@ -21,7 +21,7 @@ Deviation = Float[Array, "pairs slices positions"]
 
 
 class Vibration(eqx.Module):
-    """What vibrates while a mesh wears.
+    """Vibrating system of a mesh that wears.
 
     Attributes:
         settings: masses, damping, and how the mesh force is made; not the speeds.
@@ -30,7 +30,7 @@ class Vibration(eqx.Module):
         deviation: material that manufacturing deviations remove from the drive flanks at these positions [um]; None
             for nominal gears.
         steps: of the integrator per mesh cycle.
-        wears: whether the flanks wear under the forces of the motion.
+        wears: True if the flanks wear under the forces of the motion.
     """
 
     settings: Dynamics
@@ -63,7 +63,7 @@ def vibration_of(
     Where nothing is traced the mesh has as many pairs and the integrator as many steps as the new flanks need.
 
     Args:
-        owner: who asks, for messages.
+        owner: name of the caller, for messages.
         mesh: prepared mesh.
         loads: with a leading axis (torques,).
         settings, line_load: as for `wear`.

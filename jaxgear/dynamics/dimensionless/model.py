@@ -240,5 +240,5 @@ def rectangular_harmonics(ratio: Given, share: Given, count: int = 5) -> Float[A
 
 
 def with_relief(model: DimensionlessModel, relief: CycleRelief | None) -> DimensionlessModel:
-    """The same model with another modification."""
+    """Copy of the model with another modification."""
     return eqx.tree_at(lambda m: m.relief, model, relief, is_leaf=lambda part: part is None)

@@ -136,14 +136,14 @@ def loaded_mean(model: DimensionlessModel) -> LoadedMean:
 
 
 def frequency_shift(state: LoadedMean, frequency: Scalar, resonant: int = 0, parametric: int = 0) -> Scalar:
-    """What forced response and parametric excitation add to omega_0, of second order.
+    """Second-order shift of omega_0 by forced response and parametric excitation.
 
     Args:
         state: the expansion.
         frequency: Omega.
         resonant: order that resonates itself, n Omega ~ omega_0; its response is the slow amplitude. 0 for none. The
             order 2 n then excites parametrically, and is no part of the shift.
-        parametric: order whose difference frequency does, n Omega ~ 2 omega_0. 0 for none.
+        parametric: order whose difference frequency resonates, n Omega ~ 2 omega_0. 0 for none.
     """
     omega, forced = state.frequency, state.orders * frequency
     line = state.response(frequency, resonant)

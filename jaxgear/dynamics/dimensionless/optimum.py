@@ -275,7 +275,7 @@ def _static_search(model, relief, free, low, high, unit):
 
 @kernel
 def _dynamic_search(model, relief, free, low, high, frequency, units, iterations, steps):
-    """What Adam comes to from the first of the units and from the best of the second."""
+    """End points of Adam from each of the first units and from the best of the second."""
 
     def value(x):
         return _amplitude(model, made(relief, free, low + (high - low) * x), frequency, steps)[0]

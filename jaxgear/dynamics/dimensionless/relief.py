@@ -45,7 +45,7 @@ class CycleRelief(Checked):
         return jnp.where(two, 0.5 * (one_alone + behind), one_alone)
 
     def of_pair(self, travel: Scalar) -> Scalar:
-        """What one pair has lost [half clearances], `travel` base pitches after the begin of its contact."""
+        """Modification of one pair [half clearances], `travel` base pitches after the begin of its contact."""
         length = self.length
         from_begin, to_end = (length - travel) / length, (travel - self.contact_ratio + length) / length
         lost = jnp.zeros_like(from_begin)
@@ -67,10 +67,10 @@ class CycleRelief(Checked):
 
 
 def cycle_relief(relief: TipRelief, pair: GearPair, half_clearance: Given) -> CycleRelief:
-    """What one tip relief on both gears takes off the DTE of their mesh.
+    """Modification over the mesh cycle by the same tip relief on both gears.
 
     Args:
-        relief: of either gear.
+        relief: tip relief of either gear.
         pair: pinion and wheel, with a contact ratio from 1 to 2.
         half_clearance: b, half of the backlash on the line of action [um].
 

@@ -129,15 +129,15 @@ def damping_threshold(state: LoadedMean, *, order: int = 1) -> Scalar:
 def combination_forcing(
     state: LoadedMean, model: DimensionlessModel, frequency: Given, first: int, second: int, sign: int = 1
 ) -> Complex[Array, ""]:
-    """What two excitations of a model make at the frequency (n_1 + sign n_2) Omega.
+    """Forcing by two excitations of a model at the combination frequency (n_1 + sign n_2) Omega.
 
-    Of the parts n_1, n_2 among `model.orders`, which need not be whole: -(4 a_2 Lambda_1 Lambda_2 + Q_1 Lambda_2 + Q_2
-    Lambda_1), with the conjugate of what belongs to n_2 for the difference. Where that frequency is near omega_0 the
+    For the orders n_1, n_2 of `model.orders`, which need not be whole: -(4 a_2 Lambda_1 Lambda_2 + Q_1 Lambda_2 + Q_2
+    Lambda_1), with the conjugates of the factors of n_2 for the difference. Where that frequency is near omega_0 the
     amplitude follows from `forced_amplitude`.
 
     Args:
         state: the expansion about the loaded mean.
-        model: whose torque and displacement excite, and whose stiffness harmonics where an order is a whole number.
+        model: model with the excitations: torque, displacement, and stiffness harmonics where an order is whole.
         frequency: Omega.
         first, second: places of n_1 and n_2 in `model.orders`.
         sign: 1 for the sum, -1 for the difference.
@@ -165,7 +165,7 @@ def forced_amplitude(state: LoadedMean, forcing: Given | complex, detuning: Give
 
 
 class _Slow(NamedTuple):
-    """What drives the slow amplitude, (i zeta - s) A + coupling A* = forcing: both over 2 omega_0."""
+    """Terms of the slow amplitude equation (i zeta - s) A + coupling A* = forcing, both over 2 omega_0."""
 
     forcing: Complex[Array, ""]
     coupling: Complex[Array, ""]
