@@ -14,8 +14,8 @@ import numpy as np
 from ..dynamics import SpeedResponse
 from ..io import writing
 from ..numerics.durable import digest, sealed, unsealed, write_durably
+from ..version import version
 from ..wear import March
-from .version import version
 
 R = TypeVar("R")
 

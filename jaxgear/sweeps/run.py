@@ -5,7 +5,6 @@ import time
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from importlib import metadata
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +22,7 @@ from ..metrics import Analysis, Quantity, share_settings
 from ..numerics import AbstractMeasure, Callback, Mean, Quantile, Worst, whole
 from ..numerics.durable import digest
 from ..tolerance import Tolerance
+from ..version import version
 from ..vocabulary import quantities, quantity_of
 from .columns import CAUSE, FLAG, NUMBER, Column, parameter_columns
 from .evaluate import FEW, LEAST_STEPS, Evaluator
@@ -254,7 +254,7 @@ def _settings(made: Variants, example: np.ndarray, identity: str, plan: Abstract
         "mesh": _digest(made.mesh) if fixed else None,
         "precision": str(made.mesh_shape(example).slice_width.dtype),
         "platform": jax.local_devices()[0].platform,
-        "jaxgear": _version("jaxgear"),
+        "jaxgear": version(),
         "jax": jax.__version__,
     }
 
@@ -294,10 +294,3 @@ def _own_digest(made: Variants, example: np.ndarray, results: Sequence[Quantity]
 
 def _without_addresses(text: str) -> str:
     return re.sub(r" at 0x[0-9a-f]+", "", text)
-
-
-def _version(package: str) -> str:
-    try:
-        return metadata.version(package)
-    except metadata.PackageNotFoundError:
-        return "unknown (not installed)"
