@@ -15,6 +15,7 @@ import jaxgear
 
 PACKAGE = Path(jaxgear.__file__).parent
 ORDER = (
+    "version",
     "numerics",
     "geometry",
     "microgeometry",

@@ -15,7 +15,7 @@ from typer.core import TyperGroup
 
 from ..io.first_look import check_keys
 from ..studies import registry
-from ..studies.version import version as own_version
+from ..version import version as own_version
 from . import interrupt, streams
 from .options import File, NoCache, NoFigures, Quick, Reported, output_option, typed
 

@@ -1,7 +1,6 @@
 """From the variables of a problem to what is solved: the mesh, the loads and both modifications."""
 
-import dataclasses
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 from typing import Any, NamedTuple, TypeVar
 
@@ -19,7 +18,7 @@ from ..contact.slide import nominal_material
 from ..contact.solve import flanks_of
 from ..contact.status import Status, Statuses, status_of
 from ..microgeometry import AbstractModification, NoModification
-from ..numerics import Checked, fields_of, program, real
+from ..numerics import Checked, program, real, within_limits
 from ..tolerance import Tolerance
 from .cases import Cases, Conditions, Loads, LoadSpectrum, conditions
 
@@ -95,7 +94,8 @@ class Variants(Checked):
                 made.append(operating_point)
                 conditions = Conditions(LoadSpectrum.of(operating_point), conditions.deviations)
             cases = conditions.on(mesh)
-        possible = jnp.all(jnp.stack([jnp.asarray(True), *_in_range(made)]))
+        # Modules refuse concrete numbers out of range when they are made; traced ones pass
+        possible = within_limits(eqx.filter(made, lambda leaf: isinstance(leaf, jax.core.Tracer)))
         return Variant(mesh, cases, pinion, wheel, status_of({Status.OUT_OF_VALIDITY: ~possible}))
 
     def mesh_shape(self, values: Iterable) -> Mesh:
@@ -218,35 +218,6 @@ def two_modifications(made: object) -> tuple[AbstractModification, AbstractModif
             raise ValueError(f"design: the {name} is of type {kind}, must be a modification or None for an involute")
     pinion, wheel = made
     return pinion or NoModification(), wheel or NoModification()
-
-
-def _in_range(tree) -> Iterator[Bool[Array, ""]]:
-    """Flags of the traced numbers in the Modules of a tree: finite, and within the range of the field.
-
-    Modules refuse concrete numbers out of range when they are made; traced ones pass, and would turn an impossible
-    design into some number.
-    """
-    for module in _modules(tree):
-        for name, kind in fields_of(type(module)).items():
-            value = getattr(module, name)
-            if not kind.checked or not isinstance(value, jax.core.Tracer):
-                continue
-            yield jnp.all(jnp.isfinite(value))
-            if kind.low is not None:
-                yield jnp.all(value > kind.low if kind.open_low else value >= kind.low)
-            if kind.high is not None:
-                yield jnp.all(value < kind.high if kind.open_high else value <= kind.high)
-
-
-def _modules(node) -> Iterator[Checked]:
-    if isinstance(node, eqx.Module):
-        if isinstance(node, Checked):
-            yield node
-        for field in dataclasses.fields(node):
-            yield from _modules(getattr(node, field.name))
-    elif isinstance(node, list | tuple):
-        for part in node:
-            yield from _modules(part)
 
 
 def solve_case(

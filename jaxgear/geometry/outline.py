@@ -76,13 +76,17 @@ class Curves(NamedTuple):
             up = self.climb * jnp.maximum(self.lean - g, 0.0)
             along, depth, g = along - up * jnp.tan(self.lean), depth - up, jnp.maximum(g, self.lean)
         if self.cutter_radius is not None:
-            reach, phi = cutter_contact(g, r, self.cutter_radius, along, depth)
+            reach, phi = self.cutter_contact(g)
             return self._along_normal(g, phi, reach + rounding)
         if self.stretch is not None:  # support point of the ellipse, with half axes of stretch x rounding and rounding
             rounding = rounding / jnp.sqrt((self.stretch * jnp.cos(g)) ** 2 + jnp.sin(g) ** 2)
             along = along - (self.stretch**2 - 1) * rounding * jnp.cos(g)
         phi = (depth / jnp.tan(g) + along) / r
         return self._along_normal(g, phi, depth / jnp.sin(g) + rounding)
+
+    def cutter_contact(self, g: Real) -> tuple[Real, Real]:
+        """`cutter_contact` at the parameter g, of a gear that a cutter generates."""
+        return cutter_contact(g, self.pitch_radius, self.cutter_radius, self.offset, self.depth)
 
     def _along_normal(self, g: Real, phi: Real, distance: Real) -> tuple[Real, Real]:
         """Point (x, y) at a distance from the pitch point, which is at the angle phi from the centreline [rad]."""

@@ -23,7 +23,6 @@ from jaxtyping import Array, Float
 from ..compliance.plane import combined_modulus
 from ..contact import MeshCycle, Side
 from ..geometry import Gear, GearPair, path_of_contact
-from ..geometry.cutter import cutter_contact
 from ..geometry.gear import virtual_gear
 from ..geometry.involute import load_angle
 from ..geometry.outline import Curves, curves, rack_tip
@@ -181,7 +180,7 @@ def _section_by_cutter(drawn: Curves) -> CriticalSection:
     low, high = (jnp.full_like(drawn.depth, end) for end in (_TANGENT, jnp.pi / 2))
     g = bracketed_root(_beyond_tangent, low, high, drawn)
     x, y = drawn.trochoid(g)
-    reach, _ = _contact(g, drawn)
+    reach, _ = drawn.cutter_contact(g)
     assert drawn.cutter_radius is not None
     rolling = drawn.pitch_radius * drawn.cutter_radius / (drawn.pitch_radius + drawn.cutter_radius)
     fillet = drawn.rounding + reach**2 / (reach + rolling * jnp.sin(g))
@@ -190,11 +189,7 @@ def _section_by_cutter(drawn: Curves) -> CriticalSection:
 
 def _beyond_tangent(g: Real, drawn: Curves) -> Real:
     """Inclination of the fillet's tangent at the parameter g beyond that of the critical section [rad]."""
-    return g - _contact(g, drawn)[1] - _TANGENT
-
-
-def _contact(g: Real, drawn: Curves) -> tuple[Real, Real]:
-    return cutter_contact(g, drawn.pitch_radius, drawn.cutter_radius, drawn.offset, drawn.depth)
+    return g - drawn.cutter_contact(g)[1] - _TANGENT
 
 
 def _of_normal_section(gear: Gear) -> Gear:

@@ -5,9 +5,11 @@ import os
 import stat
 import sys
 import uuid
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any, BinaryIO
+
+import numpy as np
 
 TEMPORARY = ".tmp"  # end of the names of files that are being written
 _sum = hashlib.sha256
@@ -42,6 +44,14 @@ def unsealed(kept: bytes) -> bytes | None:
     """The content; None where it is damaged."""
     content = kept[: -_sum().digest_size]
     return content if kept == sealed(content) else None
+
+
+def digest(text: str, arrays: Iterable[Any] = ()) -> str:
+    """Digest of a text and of arrays, of which type and shape count."""
+    found = _sum(text.encode())
+    for array in map(np.asarray, arrays):
+        found.update(f"{array.dtype}{array.shape}".encode() + array.tobytes())
+    return found.hexdigest()
 
 
 class KeptFiles:

@@ -1,7 +1,6 @@
 """Checkpoints: results of a study on disk until it is complete, from which an interrupted study resumes."""
 
 import dataclasses
-import hashlib
 import io
 import shutil
 from collections.abc import Callable, Mapping
@@ -14,9 +13,9 @@ import numpy as np
 
 from ..dynamics import SpeedResponse
 from ..io import writing
-from ..numerics.durable import sealed, unsealed, write_durably
+from ..numerics.durable import digest, sealed, unsealed, write_durably
+from ..version import version
 from ..wear import March
-from .version import version
 
 R = TypeVar("R")
 
@@ -171,8 +170,4 @@ class CheckpointsOfKind(Generic[R]):
 
 def _digest(tree: Any) -> str:
     leaves, structure = jax.tree.flatten(tree)
-    digest = hashlib.sha256(f"{version()} {jax.__version__} {structure}".encode())
-    for leaf in leaves:
-        array = np.asarray(leaf)
-        digest.update(f"{array.dtype}{array.shape}".encode() + array.tobytes())
-    return digest.hexdigest()
+    return digest(f"{version()} {jax.__version__} {structure}", leaves)

@@ -13,7 +13,7 @@ from ..io import DesignFile, describe
 from ..io.table_keys import snake
 from ..metrics import Finding
 from ..microgeometry import AbstractModification
-from .version import version
+from ..version import version
 
 
 def identity(file: DesignFile) -> dict[str, Any]:

@@ -1,12 +1,10 @@
 """A sweep: variants in, table out, with the devices and the disk at work at the same time."""
 
-import hashlib
 import re
 import time
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from importlib import metadata
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +20,9 @@ from ..contact import Mesh, solve
 from ..contact.operating_point import Torque
 from ..metrics import Analysis, Quantity, share_settings
 from ..numerics import AbstractMeasure, Callback, Mean, Quantile, Worst, whole
+from ..numerics.durable import digest
 from ..tolerance import Tolerance
+from ..version import version
 from ..vocabulary import quantities, quantity_of
 from .columns import CAUSE, FLAG, NUMBER, Column, parameter_columns
 from .evaluate import FEW, LEAST_STEPS, Evaluator
@@ -254,7 +254,7 @@ def _settings(made: Variants, example: np.ndarray, identity: str, plan: Abstract
         "mesh": _digest(made.mesh) if fixed else None,
         "precision": str(made.mesh_shape(example).slice_width.dtype),
         "platform": jax.local_devices()[0].platform,
-        "jaxgear": _version("jaxgear"),
+        "jaxgear": version(),
         "jax": jax.__version__,
     }
 
@@ -262,17 +262,12 @@ def _settings(made: Variants, example: np.ndarray, identity: str, plan: Abstract
 def _digest(tree) -> str:
     """Digest of the numbers and the structure of a pytree."""
     leaves, structure = jax.tree.flatten(tree)
-    digest = hashlib.sha256(_without_addresses(str(structure)).encode())
-    for leaf in leaves:
-        array = np.asarray(leaf)
-        digest.update(f"{array.dtype}{array.shape}".encode() + array.tobytes())
-    return digest.hexdigest()
+    return digest(_without_addresses(str(structure)), leaves)
 
 
 def _design_digest(traced) -> str:
     """Digest of what the variables make: a function has no other identity that outlives the process."""
-    text = _without_addresses(str(traced.jaxpr))
-    return hashlib.sha256(text.encode() + _digest(traced.consts).encode()).hexdigest()
+    return digest(_without_addresses(str(traced.jaxpr)) + _digest(traced.consts))
 
 
 def _own_digest(made: Variants, example: np.ndarray, results: Sequence[Quantity]) -> str | None:
@@ -299,10 +294,3 @@ def _own_digest(made: Variants, example: np.ndarray, results: Sequence[Quantity]
 
 def _without_addresses(text: str) -> str:
     return re.sub(r" at 0x[0-9a-f]+", "", text)
-
-
-def _version(package: str) -> str:
-    try:
-        return metadata.version(package)
-    except metadata.PackageNotFoundError:
-        return "unknown (not installed)"

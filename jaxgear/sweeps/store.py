@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..contact.status import Status
-from ..numerics.durable import write_durably
+from ..numerics.durable import digest, write_durably
 from .columns import CONVERGED, STATUS, VARIANT, Column, described
 
 MANIFEST = "_sweep.parquet"  # Arrow and Spark pass over such names, others find no row in it
@@ -60,7 +60,7 @@ class Store:
         self.folder, self.manifest = Path(folder), manifest
         self._variants, self._part_rows = (int(manifest.settings[key]) for key in ("variants", "part_rows"))
         self._schema = _schema(manifest)
-        self._fingerprint = _digest(manifest.settings)
+        self._fingerprint = digest(json.dumps(manifest.settings, sort_keys=True))
 
     @property
     def parts(self) -> int:
@@ -140,9 +140,9 @@ class Store:
         return pyarrow.Table.from_arrays(arrays, schema=self._schema)
 
     def _path(self, part: int, data) -> Path:
-        digest = hashlib.sha256(f"{self._fingerprint} {part} ".encode())
-        digest.update(data)
-        return self.folder / f"part-{part:07d}-{digest.hexdigest()[:16]}.parquet"
+        found = hashlib.sha256(f"{self._fingerprint} {part} ".encode())
+        found.update(data)
+        return self.folder / f"part-{part:07d}-{found.hexdigest()[:16]}.parquet"
 
     def _is_sound(self, path: Path) -> bool:
         part = _PART.fullmatch(path.name)
@@ -202,7 +202,8 @@ def _schema(manifest: Manifest):
             value = settings[key]
             notes[key] = value if isinstance(value, str) else json.dumps(value, sort_keys=True)
     plain = [[column.name, *sorted(field.metadata.items())] for column, field in zip(manifest.columns, fields)]
-    return pyarrow.schema(fields, metadata={**notes, "fingerprint": _digest([notes, str(plain)])})
+    everything = json.dumps([notes, str(plain)], sort_keys=True)
+    return pyarrow.schema(fields, metadata={**notes, "fingerprint": digest(everything)})
 
 
 def _column(field) -> Column:
@@ -224,11 +225,6 @@ def _parquet(table) -> memoryview:
     options = {"compression": "zstd", "compression_level": 1, "use_dictionary": False, "write_page_checksum": True}
     parquet.write_table(table, file, **options)
     return memoryview(file.getvalue())
-
-
-def _digest(data) -> str:
-    """Digest of plain data."""
-    return hashlib.sha256(json.dumps(data, sort_keys=True).encode()).hexdigest()
 
 
 def _check_folder(folder: Path) -> None:
