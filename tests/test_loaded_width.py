@@ -192,7 +192,8 @@ def test_slices_that_feel_each_other_have_their_own_widths(mesh, cycle):
 
 @pytest.mark.slow
 def test_a_prescribed_error_makes_its_own_widths(mesh):
-    """There and back, up to what a third solution would change; the derivative is that of all that is computed."""
+    """There and back, but where the first solutions under the load and at the error make other widths: at one position;
+    the derivative is that of all that is computed."""
     torque = 50.0
     cycle = jg.solve(mesh, torque, **reliefs())
     teeth = cycle.transmission_error - mesh.hub * cycle.force / mesh.pair.face_width
@@ -200,7 +201,8 @@ def test_a_prescribed_error_makes_its_own_widths(mesh):
     def force(at):
         return jg.solve_at(mesh, at, torque=torque, **reliefs()).force
 
-    np.testing.assert_allclose(force(teeth), float(cycle.force), rtol=2e-4)
+    off = np.abs(force(teeth) / cycle.force - 1)
+    assert off.max() < 5e-4 and np.sort(off)[-2] < 1e-9
     slope = jax.jvp(force, (teeth,), (jnp.ones(16),))[1]
     central = (force(teeth + 1e-5) - force(teeth - 1e-5)) / 2e-5
     np.testing.assert_allclose(slope, central, rtol=1e-6)

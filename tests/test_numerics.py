@@ -1,5 +1,7 @@
 """Roots, safe functions, quadrature, the field checks and those of annotations."""
 
+from functools import partial
+
 import jax
 import jax.numpy as jnp
 import jaxtyping
@@ -105,6 +107,19 @@ def test_secants_find_a_root_behind_kinks_and_dents():
 
     root = rising_root(function, jnp.zeros(4), most=30, within=1e-9)
     np.testing.assert_allclose(function(root), 0.0, atol=1e-9)
+
+
+def test_by_numbers_leaves_out_what_varies_along_other_axes():
+    """A modification of the profile does not depend on the place over the face, which may have derivatives."""
+
+    @partial(by_numbers, entrywise=(0, 1))
+    def function(x, y):
+        return jnp.sin(x)
+
+    x, y = jnp.ones((2, 1, 4)), jnp.ones((1, 3, 1))
+    slopes = jax.grad(lambda x, y: function(x, y).sum(), argnums=(0, 1))(x, y)
+    np.testing.assert_allclose(slopes[0], np.cos(1.0))
+    np.testing.assert_array_equal(slopes[1], np.zeros((1, 3, 1)))
 
 
 def test_by_numbers_changes_how_derivatives_are_formed_and_not_what_they_are():

@@ -1,6 +1,5 @@
 """Pictures of many variants and of manufactured gears show the table's numbers, name units and hide no failure."""
 
-
 import matplotlib
 import numpy as np
 import pytest

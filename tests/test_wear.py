@@ -293,7 +293,7 @@ def test_worn_flanks_do_not_depend_on_the_number_of_positions(amount):
     (coarse, volume), (fine, fine_volume) = worn_by(64), worn_by(128)
     change = np.abs(coarse - fine) / fine.max()
     # where load sets in at the root of the driver it changes within a position, and the flank with it
-    assert change.max() < 0.05 and np.median(change) < 0.005 and change[:, 16:-3].max() < 0.015
+    assert change.max() < 0.06 and np.median(change) < 0.005 and change[:, 16:-3].max() < 0.015
     np.testing.assert_allclose(volume, fine_volume, rtol=0.002)
 
 

@@ -89,6 +89,9 @@ def by_numbers(function: Callable[_Given, Result], *, entrywise: Collection[int]
 
 
 def _times(change, derivative):
+    """Change of a result; none by a number that varies along an axis which the result does not have."""
+    if jnp.broadcast_shapes(jnp.shape(change), jnp.shape(derivative)) != jnp.shape(derivative):
+        return jnp.zeros_like(derivative)
     return change * stored(derivative)
 
 

@@ -289,7 +289,7 @@ class Case(eqx.Module):
         """Estimated error of the largest flank pressure at all time steps of a march, as its `cycles` [MPa].
 
         By how much it changes where the worn flanks are known on every other point only, and where the contacts are as
-        wide as their own loads and curvatures make them instead of as one pair that carries the full load.
+        wide as their own loads and curvatures make them instead of as the loads of unmodified flanks do.
         """
 
         def largest(depth, cycle: MeshCycle, load: OperatingPoint, line_load):
