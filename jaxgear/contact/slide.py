@@ -15,8 +15,8 @@ contact that the corner leaves, with which every convex relief has one place of 
 one, by up to 0.08 um on usual reliefs and 0.4 um on one of 15 um over 1 mm. A search finds the place to rounding, and
 derivatives of any order follow from what stays zero (implicit function theorem). Random tables that jump by several um
 from millimetre to millimetre hold several such places: the one that is found is 0.04 um above the least gap in the mean
-and 3 um at worst (0 to 8 um every 0.5 mm), and one contact in 16,000 is not found in 20 steps, with a derivative that is
-near. Points across the contact give mean and curvature of c, the latter by least squares with the weight of the
+and 3 um at worst (0 to 8 um every 0.5 mm), and one contact in 16,000 is not found in 20 steps, with a derivative that
+is near. Points across the contact give mean and curvature of c, the latter by least squares with the weight of the
 pressure, which kinks and corners of a table do not upset; where points stop at a corner, c seems hollow, and pressures
 there are those of corners. Against a fine search with more points the gap is off by 0.01 um on reliefs and crowning,
 0.03 um on a root relief of 8 um over 1.5 mm (19/48, module 3, 50 N m).
