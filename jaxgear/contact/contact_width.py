@@ -13,7 +13,7 @@ from jaxtyping import Array, Float
 
 from ..geometry import GearPair, reduced_radius
 from ..microgeometry import AbstractModification, Flank, NoModification, terms
-from ..numerics import by_numbers, over_slices, safe_sqrt, stored
+from ..numerics import by_numbers, over_slices, safe_sqrt
 from .kinematics import Side
 from .mesh import Mesh
 
@@ -100,7 +100,7 @@ def _side(mesh: Mesh, side: Side, direction: float) -> PlaceSide:
     roll_length = over_slices(side.contact_roll_length)
     return PlaceSide(
         # arc length of an involute: ds = rho / r_b d rho
-        stored(direction * side.base_radius / roll_length),
+        direction * side.base_radius / roll_length,
         roll_length,
         number(side.base_radius),
         number(side.tip_roll_length),

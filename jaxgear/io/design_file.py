@@ -15,6 +15,7 @@ from jaxtyping import Array, Float
 from ..compliance import AbstractCompliance
 from ..conditions import LoadSpectrum
 from ..contact import Mesh, OperatingPoint, Resolution, begin_contact, fewest_pairs, prepare
+from ..contact.contact_width import full_load
 from ..geometry import GearPair, Material
 from ..metrics.findings import LIMITS
 from ..microgeometry import AbstractModification
@@ -379,7 +380,7 @@ class DesignFile:
 @program
 def _single_deflection(pair: GearPair, torque) -> Float[Array, ""]:
     """Deflection of one pair of teeth that carries the torque [N m] alone, after ISO 6336-1 [um]."""
-    line_load = 1e3 * torque / (pair.pinion.base_radius * pair.face_width)
+    line_load = full_load(pair, torque)
     return line_load / iso_stiffness(pair, line_load).single
 
 

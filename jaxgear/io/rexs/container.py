@@ -18,8 +18,8 @@ _MOST = 256 * 2**20  # of a model [bytes]: a gearbox of a hundred gears has a fe
 _MOST_MEMBERS = 10_000
 _ENCRYPTED = 0x1  # flag of a member
 _KNOWN = zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED
-# what Python raises for one, a version that it does not know and offsets beyond the file included
-_DAMAGED = zipfile.BadZipFile, zlib.error, EOFError, ValueError, IndexError, NotImplementedError, struct.error
+# what Python raises for one, offsets beyond the file and, as a RuntimeError, a version that it does not know included
+_DAMAGED = zipfile.BadZipFile, zlib.error, EOFError, ValueError, IndexError, RuntimeError, struct.error
 
 
 def is_container(held: bytes) -> bool:
