@@ -175,6 +175,7 @@ def at_rest(oscillator: Oscillator, phase: Scalar) -> Rest:
     return Rest((held + moved) / root_mass, force, slope)
 
 
+@program
 def static_force(oscillator: Oscillator) -> Scalar:
     """Mesh force [N] under the mean load, averaged over the mesh cycle at rest: that of dynamic factors.
 
@@ -216,10 +217,13 @@ class Natural(NamedTuple):
     highest: Scalar
 
 
-@program
 def natural_frequencies(oscillator: Oscillator) -> Natural:
     """Natural frequencies with the mesh stiffness under the static load, averaged over the cycle."""
-    stiffness = oscillator.mesh_force.mean_tangent_stiffness(static_force(oscillator))
+    return _natural(oscillator, oscillator.mesh_force.mean_tangent_stiffness(static_force(oscillator)))
+
+
+@program
+def _natural(oscillator: Oscillator, stiffness: Scalar) -> Natural:
     along = oscillator.direction / jnp.sqrt(oscillator.mass)
     total = stiffness * along[:, None] * along[None]
     if oscillator.stiffness is not None:
