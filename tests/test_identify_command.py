@@ -11,9 +11,10 @@ from commands import FIXED, VARIABLES, assert_refused, call
 
 from jaxgear.conditions import solve_case
 from jaxgear.contact.kinematics import kinematics
-from jaxgear.io import DesignFile, load_design, read_rexs
+from jaxgear.io import DesignFile, load_design
 from jaxgear.numerics import real
 from jaxgear.optimize import Identified
+from jaxgear.rexs import read_rexs
 from jaxgear.studies import DesignIdentification, identification
 from jaxgear.tolerance import ToleranceClass
 

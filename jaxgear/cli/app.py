@@ -8,12 +8,13 @@ import sys
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Any, Literal, NoReturn
+from typing import Annotated, Any, NoReturn
 
 import typer
 from typer.core import TyperGroup
 
 from ..io.first_look import check_keys
+from ..provided import provided
 from ..studies import registry
 from ..version import version as own_version
 from . import interrupt, streams
@@ -28,19 +29,21 @@ OK, NOT_CONVERGED, FAILED, INTERRUPTED = 0, 1, 2, 130
 
 
 class _Commands(TyperGroup):
-    """The commands, and the studies of other packages, which are looked for where a name is not known."""
+    """The commands, with those and the studies that entry points name, which are looked for where a name is unknown."""
 
     def list_commands(self, ctx: Any) -> list[str]:
         """Names for the help."""
-        return list(dict.fromkeys([*super().list_commands(ctx), *registry.provided()]))
+        return list(dict.fromkeys([*super().list_commands(ctx), *provided("commands"), *registry.provided()]))
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
         """The command of a name; None for an unknown one."""
         found = super().get_command(ctx, cmd_name)
         place = registry.own().get(cmd_name) if found else registry.provided().get(cmd_name)
-        if found is None and place is not None:
+        command = None if found or place else provided("commands").get(cmd_name)
+        if found is None and (place or command):
+            function = command.load() if command else _study(place, cmd_name)
             alone = typer.Typer(add_completion=False)
-            alone.command(cmd_name)(_study(place, cmd_name))
+            alone.command(cmd_name, help=_unbroken(function))(function)
             found = typer.main.get_command(alone)
         if found is not None and place is not None:
             found.help = registry.help_of(place)
@@ -56,6 +59,11 @@ app = typer.Typer(
     "130 interrupted (a sweep resumes). Begin with jaxgear new. Guides: examples/guides/index.md of the source; "
     "python -m jaxgear.io prints every table and key of a design file.",
 )
+
+
+def _unbroken(function: Callable[..., Any]) -> str:
+    """Docstring of a command: the terminal breaks the lines of a paragraph, not the source."""
+    return "\n\n".join(" ".join(paragraph.split()) for paragraph in (function.__doc__ or "").split("\n\n"))
 
 
 def _show_version(wanted: bool) -> None:
@@ -96,7 +104,7 @@ def new(
     A file that is there is never replaced.
     """
     with interrupt.importing():
-        from .convert import new
+        from .new import new
     new(
         file,
         teeth,
@@ -291,42 +299,8 @@ def sweep(
     return OK if fine else NOT_CONVERGED
 
 
-@app.command()
-def convert(
-    source: Annotated[Path, typer.Argument(metavar="IN", help="FILE.toml or FILE.rexs.", show_default=False)],
-    target: Annotated[
-        Path | None, typer.Argument(metavar="OUT", help="The other kind of file; none to list the stages of IN.")
-    ] = None,
-    stage: Annotated[int | None, typer.Option(metavar="ID", help="Cylindrical stage, where there are several.")] = None,
-    flank: Annotated[
-        Literal["left", "right"] | None, typer.Option(help="Flanks that touch, where both are modified differently.")
-    ] = None,
-    load_case: Annotated[int | None, typer.Option(metavar="ID", help="Load case, where there are several.")] = None,
-    torque: Annotated[
-        float | None, typer.Option(metavar="NM", help="Torque on the pinion in N m, in place of that of a REXS file.")
-    ] = None,
-    given: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--set", metavar="KEY=VALUE", help="A number in place of that of a REXS file, as pinion.tip_diameter=63.5."
-        ),
-    ] = None,
-) -> int:
-    """Convert a design file into a REXS file, or a stage of a REXS file into a design file.
-
-    REXS is the open exchange format for gearbox data. The gears with their modifications, torque and speed are
-    converted. A file that is there is never replaced. Without OUT the stages of a REXS file are listed, with why those
-    are not converted that are not.
-    """
-    with interrupt.importing():
-        from .convert import convert
-    convert(source, target, stage=stage, flank=flank, load_case=load_case, torque=torque, given=given or [])
-    return OK
-
-
-for _command in app.registered_commands:  # the terminal breaks the lines of a paragraph, not the source
-    _paragraphs = (_command.callback.__doc__ or "").split("\n\n")
-    _command.help = "\n\n".join(" ".join(paragraph.split()) for paragraph in _paragraphs)
+for _command in app.registered_commands:
+    _command.help = _unbroken(_command.callback)
 
 
 def main(arguments: Sequence[str] | None = None) -> NoReturn:

@@ -11,13 +11,14 @@ import equinox as eqx
 import numpy as np
 
 from ..contact import Mesh, Resolution
-from ..io import DesignFile, DesignFileError, read_measurement, write_design, write_flanks, write_rexs
+from ..io import DesignFile, DesignFileError, read_measurement, write_design, write_flanks
 from ..io.design_file import FileDesign
 from ..io.errors import naming, problem, refused
 from ..io.tolerance_table import quality_classes
 from ..microgeometry import AbstractModification, EndRelief, LeadCrowning, LeadSlope
 from ..numerics import check, real
 from ..optimize import Identified, Measurement, identify, period_of
+from ..provided import provided
 from ..report import Table
 from ..tolerance import ToleranceClass
 from .checkpoints import Checkpoints
@@ -36,7 +37,6 @@ _HELP = (
 )
 _OVER_FACE = LeadCrowning, LeadSlope, EndRelief  # the helix tolerance is that of these, the profile's of all others
 _RELATED = 0.7  # least correlation that is said
-_REXS = "identified.rexs"
 _NOISE = "95 % of\nnoise [um]"
 _MOST_PANELS = 5
 _SHOWN = 4.0  # base pitches of a whole revolution
@@ -311,17 +311,19 @@ class IdentificationResult(AbstractStudyResult):
         }
 
     def details(self) -> Iterator[str]:
-        """Why there is no REXS file, where its format has no place for the pair."""
+        """Reasons why the pair is not written in a format that has no place for it."""
         if not list(self.failures()):
             with tempfile.TemporaryDirectory() as folder:
-                yield from self._exchanged(Path(folder) / _REXS)
+                yield from self._exchanged(Path(folder))
 
-    def _exchanged(self, path: Path) -> Iterator[str]:
-        """Writes the REXS file, or says why it cannot."""
-        try:
-            write_rexs(path, materials=self.design.materials, **self._pair())
-        except ValueError as error:
-            yield f"{path.name} is not written: {str(error).removeprefix('write_rexs: ')}"
+    def _exchanged(self, folder: Path) -> Iterator[str]:
+        """Write a file of every provided format; yields the reasons why one is not written."""
+        for name, entry in provided("formats").items():
+            path, write = folder / f"identified.{name}", entry.load()
+            try:
+                write(path, materials=self.design.materials, **self._pair())
+            except ValueError as error:
+                yield f"{path.name} is not written: {str(error).removeprefix(f'{write.__name__}: ')}"
 
     def _pair(self) -> dict[str, Any]:
         """The pair with the estimates, as both writers take it."""
@@ -335,7 +337,7 @@ class IdentificationResult(AbstractStudyResult):
         return {"prior": self.design.design(before), "identified": self._flanks()}
 
     def write(self, folder: Path) -> None:
-        """The unknowns as CSV, and the pair with the estimates as design file, flanks and REXS file."""
+        """The unknowns as CSV, and the pair with the estimates as design file, flanks and files of other formats."""
         with (folder / "identified.csv").open("w", newline="", encoding="utf-8") as file:
             writer = csv.writer(file)
             names = "name", "unit", "estimate", "standard_deviation", "prior_mean", "prior_standard_deviation"
@@ -351,7 +353,7 @@ class IdentificationResult(AbstractStudyResult):
             return
         write_design(folder / "identified.toml", **self._pair())
         write_flanks(folder / "flanks.csv", self.mesh, self._designs())
-        list(self._exchanged(folder / _REXS))
+        list(self._exchanged(folder))
 
     def figures(self) -> dict[str, Any]:
         """Measured and fitted transmission error, and the flanks of prior and estimates within their tolerances."""

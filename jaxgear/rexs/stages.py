@@ -4,10 +4,10 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..errors import DesignFileError, naming
+from ..io.errors import DesignFileError, naming
+from .model import Component, Model
 from .open_numbers import Completed
-from .read import model_of, read_stage
-from .rexs_model import Component, Model
+from .read import load_model, read_stage
 
 _PAIR = "cylindrical_stage"
 _OTHER = {  # kinds of stages without a pair of their own
@@ -54,7 +54,7 @@ def rexs_stages(path: str | Path) -> tuple[RexsStage, ...]:
         DesignFileError: where the file is not a REXS file.
     """
     with naming(Path(path)):
-        model = model_of(Path(path))
+        model = load_model(Path(path))
         return tuple(_stages(model))
 
 

@@ -9,7 +9,7 @@ import zipfile
 import zlib
 from pathlib import PurePosixPath
 
-from ..errors import DesignFileError
+from ..io.errors import DesignFileError
 
 SUFFIXES = (".rexsz", ".zip")
 MODELS = (".rexs", ".xml", ".rexsj", ".json")

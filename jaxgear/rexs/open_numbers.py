@@ -7,9 +7,11 @@ root diameter, everything else by what `Gear` has without it, the basic rack of 
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from typing import Any
 
-from ..errors import DesignFileError, not_known
-from .rexs_model import Attribute, Component
+from ..geometry import Gear
+from ..io.errors import DesignFileError, not_known
+from .model import Attribute, Component
 
 # Keys of a design file: attribute of REXS and its unit there, by the component that says it.
 GEAR = {
@@ -34,6 +36,16 @@ STAGE = {"center_distance": ("center_distance", "mm")}
 OFFSET = "pair.axial_offset"  # for which REXS has no place
 _KEYS = [f"{gear}.{name}" for gear in ("pinion", "wheel") for name in (GEAR | FLANK | TOOL)]
 _KEYS += ["pair.center_distance", OFFSET]
+
+
+def attributes(keys: Mapping[str, tuple[str, str]], gear: Gear, **others: object) -> dict[str, tuple[Any, str]]:
+    """(value, unit) of the attributes of a component, from fields of a gear or from others in place of these."""
+    return {name: (others.get(field, getattr(gear, field)), unit) for field, (name, unit) in keys.items()}
+
+
+def rack_by_hand(owner: str) -> str:
+    """The options that give the rack of a gear, for messages."""
+    return "or give the rack: " + " ".join(f"--set {owner}.{name}=VALUE" for name in TOOL)
 
 
 @dataclass

@@ -1,4 +1,4 @@
-"""REXS files (https://www.rexs.info): the open exchange format for gearbox data, read and written."""
+"""The public names, for type checkers and for `__init__.py`, which imports each when it is asked for."""
 
 from .read import RexsPair as RexsPair
 from .read import read_rexs as read_rexs

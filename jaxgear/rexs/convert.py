@@ -1,4 +1,4 @@
-"""The commands `new` and `convert`: a design file to begin with, its conversion to REXS and back, stages of a file."""
+"""Conversion of a design file to REXS and back, and the list of the stages of a REXS file."""
 
 import os
 from collections.abc import Iterable
@@ -7,12 +7,14 @@ from typing import Any, Literal
 
 import jax
 
+from ..cli import interrupt, terminal
 from ..geometry import GearPair
-from ..io import DesignFileError, RexsStage, load_design, read_rexs, rexs_stages, write_design, write_rexs
+from ..io import DesignFileError, load_design, write_design
 from ..io.toml import read
-from ..io.write_design import write_starter
 from ..report import Table
-from . import interrupt, terminal
+from .read import read_rexs
+from .stages import RexsStage, rexs_stages
+from .write import write_rexs
 
 _REXS, _DESIGN = (".rexs", ".xml", ".rexsj", ".json", ".rexsz", ".zip"), (".toml",)
 _LOAD = "torque", "torque_lbf_in", "torque_lbf_ft", "speed"  # of [load], likewise
@@ -136,28 +138,4 @@ def _say(target: Path, pair: GearPair) -> None:
     terminal.say(
         f"{target}: {int(pinion.teeth)}/{int(wheel.teeth)} teeth, module {float(pinion.module):g} mm, "
         f"centre distance {float(pair.working_center_distance):.6g} mm"
-    )
-
-
-def new(
-    path: Path,
-    teeth: tuple[int, int],
-    *,
-    module: float,
-    torque: float,
-    face_width: float,
-    speed: float | None,
-    helix_angle: float = 0.0,
-    pressure_angle: float = 20.0,
-    profile_shift: tuple[float, float] = (0.0, 0.0),
-) -> None:
-    """Writes a design file; a file that is there is never replaced."""
-    jax.config.update("jax_enable_x64", True)
-    given: dict[str, Any] = {"module": module, "torque": torque, "face_width": face_width, "speed": speed}
-    given |= {"helix_angle": helix_angle, "pressure_angle": pressure_angle, "profile_shift": profile_shift}
-    with interrupt.held(f"{path} is there"):
-        pair = write_starter(path, teeth, **given)
-    terminal.say(
-        f"{path}: {teeth[0]}/{teeth[1]} teeth, module {module:g} mm, centre distance "
-        f"{float(pair.working_center_distance):.6g} mm; jaxgear optimize {path} finds its tip reliefs"
     )

@@ -1,35 +1,35 @@
-"""A REXS model as data, from and to the XML of a file.
+"""A REXS model: components, relations and load cases, from and to the nested data that both forms of a file hold.
 
 REXS, the Reusable Engineering EXchange Standard of FVA (https://www.rexs.info), describes a gear unit by its parts and
-what they have to do with each other. A file holds one model. Whatever is wrong with it is refused in one line that
-names component and attribute.
+their relations. A file holds one model. Whatever is wrong with it is refused in one line that names component and
+attribute.
 
-A file comes from anywhere, so it is read without a document type: Expat reports the start of one before anything that
-it declares is looked at, and the file is refused there. Without declarations there are no entities to expand, inside
-the file or from elsewhere. REXS has a schema (XSD) and no document type, so that no proper file is lost.
+The data are those of the JSON form with texts in place of numbers: an attribute is
+`{"id": "face_width", "unit": "mm", "floating_point": "20.0"}`. The XML form says the same in elements.
 """
 
 import math
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from decimal import Decimal
 from typing import Any
-from xml.etree.ElementTree import Element, SubElement, TreeBuilder, indent, tostring
-from xml.parsers import expat
 
 import numpy as np
 
-from ...numerics import Number
-from ..errors import DesignFileError
-from ..value_types import outside
+from ..io.errors import DesignFileError
+from ..io.value_types import outside
+from ..numerics import Number
+from ..version import version as own_version
 from .values import checked_version, decoded, kind_of, whole, written
 
 CUSTOM = "custom_jaxgear_"  # of attributes that REXS does not know: it leaves "custom_..." to programs
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 # what earlier versions call a unit of the current one
 _ALSO = {"deg": ("\u00b0",), "MPa": ("N / mm^2",), "none": ("",), "mum": ("\u00b5m", "\u03bcm", "um")}
+_SCALARS = "floating_point integer boolean enum string reference_component file_reference date_time".split()
+_ARRAYS = [f"{kind}_array" for kind in ("floating_point", "integer", "boolean", "enum", "string")]
 # names in versions before 2, by the type of the component
 _EARLIER = {
     "rack_shaped_tool": {
@@ -196,18 +196,6 @@ class Model:
             raise DesignFileError("", f"a relation names component {number}, which is missing")
         return self.components[number]
 
-    def put(self, component: Component) -> None:
-        """Takes up a component of a file."""
-        if component.id in self.components:
-            raise DesignFileError(component.where(), "is given twice in the file")
-        self.components[component.id] = component
-
-    def put_case(self, number: int, said: Iterable[Component]) -> None:
-        """Takes up a load case of a file."""
-        if number in self.cases:
-            raise DesignFileError(f"load_case {number}", "is given twice in the file")
-        self.cases[number] = {component.id: component for component in said}
-
     def related(self, kind: str, role: str, number: int, wanted: str) -> list[Component]:
         """The components with a wanted role in the relations of a kind in which a component has a role."""
         found = [
@@ -232,158 +220,116 @@ class Model:
         self.cases.setdefault(case, {})[component.id] = said
 
 
-def current(kind: str, attribute: str) -> str:
-    """The name that an attribute of a type of component has in REXS 2."""
-    return _EARLIER.get(kind, {}).get(attribute, attribute)
-
-
 def attributes_of(values: dict[str, tuple[Any, str]]) -> dict[str, Attribute]:
     """Attributes from (value, unit); those of None are left out."""
     given = {name: pair for name, pair in values.items() if pair[0] is not None}
     return {name: Attribute(written(value), unit, kind_of(name, value, unit)) for name, (value, unit) in given.items()}
 
 
-_CASES = "1"  # id of the one load spectrum
-
-
-def xml(model: Model) -> bytes:
-    """The file: UTF-8 with a byte order mark, as REXS has it."""
-    root = Element("model", origin(model))
-    relations = SubElement(root, "relations")
-    for number, relation in enumerate(model.relations, 1):
-        order = {} if relation.order is None else {"order": str(relation.order)}
-        element = SubElement(relations, "relation", {"id": str(number), "type": relation.type, **order})
-        for role, part in relation.refs:
-            SubElement(element, "ref", id=str(part), role=role, hint=model.components[part].type)
-    _components(SubElement(root, "components"), model.components.values())
-    if model.cases:
-        spectrum = SubElement(root, "load_spectrum", id=_CASES)
-        for case, said in model.cases.items():
-            _components(SubElement(spectrum, "load_case", id=str(case)), said.values())
-    indent(root)
-    return b"\xef\xbb\xbf" + tostring(root, encoding="UTF-8", xml_declaration=True) + b"\n"
-
-
-def _components(parent: Element, components: Iterable[Component]) -> None:
-    for component in components:
-        name = {"name": component.name} if component.name else {}
-        element = SubElement(parent, "component", {"id": str(component.id), "type": component.type, **name})
-        for attribute, held in component.attributes.items():
-            unit = {} if held.unit is None else {"unit": held.unit}
-            item = SubElement(element, "attribute", {"id": attribute, **unit})
-            if isinstance(held.value, tuple):
-                array = SubElement(item, "array")
-                for value in held.value:
-                    SubElement(array, "c").text = value
-            else:
-                item.text = held.value
-
-
-def origin(model: Model) -> dict[str, str]:
-    """Version of REXS, program and time."""
-    return {
-        "version": model.version,
-        "applicationId": "jaxgear",
-        "applicationVersion": _own_version(),
-        "date": datetime.now(UTC).isoformat(timespec="seconds"),
-    }
-
-
-def _own_version() -> str:
-    from importlib import metadata
-
-    try:
-        return metadata.version("jaxgear")
-    except metadata.PackageNotFoundError:  # code that runs uninstalled
-        return "unknown"
-
-
-_DEEPEST = 16  # twice the depth of the schema
-
-
-def parse(content: bytes) -> Model:
-    """The model of a file.
+def model_of(data: dict[str, Any]) -> Model:
+    """The model of the data of a file.
 
     Raises:
-        DesignFileError: for what is not well-formed XML, declares a document type or is no REXS model.
+        DesignFileError: for data of another structure, or an id that is not a number or occurs twice.
     """
-    root = _tree(content)
-    if root.tag != "model":
-        raise DesignFileError("", f"<{root.tag}> is not the <model> of a REXS file")
-    model = Model(checked_version(root.get("version", "")))
-    for element in root.iterfind("components/component"):
-        model.put(_component(element))
-    model.relations = [_relation(element) for element in root.iterfind("relations/relation")]
-    for case in root.iterfind("load_spectrum/load_case"):
-        said = [_component(element) for element in case.iterfind("component")]
-        model.put_case(whole(case.get("id", ""), "load_case: id"), said)
+    model = Model(checked_version(str(data.get("version", ""))))
+    for component in map(_component, _objects(data, "components")):
+        if component.id in model.components:
+            raise DesignFileError(component.where(), "is given twice in the file")
+        model.components[component.id] = component
+    model.relations = [_relation(item) for item in _objects(data, "relations")]
+    spectrum = data.get("load_spectrum")
+    for case in [] if spectrum is None else _objects(checked_object(spectrum, "load_spectrum"), "load_cases"):
+        said, number = map(_component, _objects(case, "components")), whole(case.get("id", ""), "load_case: id")
+        if number in model.cases:
+            raise DesignFileError(f"load_case {number}", "is given twice in the file")
+        model.cases[number] = {component.id: component for component in said}
     return model
 
 
-def _tree(content: bytes) -> Element:
-    builder, depth = TreeBuilder(), 0
-
-    def start(name: str, attributes: dict[str, str]) -> None:
-        nonlocal depth
-        depth += 1
-        if depth > _DEEPEST:
-            raise DesignFileError("", f"line {parser.CurrentLineNumber}: elements are nested too deeply")
-        builder.start(name, attributes)
-
-    def end(name: str) -> None:
-        nonlocal depth
-        depth -= 1
-        builder.end(name)
-
-    def doctype(*_: Any) -> None:
-        raise DesignFileError(
-            "", f"line {parser.CurrentLineNumber}: declares a document type, which REXS does not have"
-        )
-
-    parser = expat.ParserCreate()
-    parser.buffer_text = True
-    parser.StartElementHandler, parser.EndElementHandler = start, end
-    parser.CharacterDataHandler, parser.StartDoctypeDeclHandler = builder.data, doctype
-    try:
-        parser.Parse(content, True)
-    except expat.ExpatError as error:
-        problem = expat.errors.messages.get(error.code, "not well-formed")
-        raise DesignFileError("", f"line {error.lineno}, column {error.offset + 1}: not valid XML: {problem}") from None
-    except (ValueError, LookupError) as error:  # of an encoding
-        if isinstance(error, DesignFileError):
-            raise
-        raise DesignFileError("", f"not valid XML: {error}") from None
-    return builder.close()
+def data_of(model: Model) -> dict[str, Any]:
+    """The data of a file: version of REXS, program and time, relations, components, load cases."""
+    data: dict[str, Any] = {
+        "version": model.version,
+        "applicationId": "jaxgear",
+        "applicationVersion": own_version(),
+        "date": datetime.now(UTC).isoformat(timespec="seconds"),
+        "relations": [
+            {
+                "id": number,
+                "type": relation.type,
+                **({} if relation.order is None else {"order": relation.order}),
+                "refs": [
+                    {"id": part, "role": role, "hint": model.components[part].type} for role, part in relation.refs
+                ],
+            }
+            for number, relation in enumerate(model.relations, 1)
+        ],
+        "components": [_data(component) for component in model.components.values()],
+    }
+    if model.cases:
+        cases = [{"id": case, "components": [*map(_data, said.values())]} for case, said in model.cases.items()]
+        data["load_spectrum"] = {"id": 1, "load_cases": cases}
+    return data
 
 
-def _component(element: Element) -> Component:
-    component = Component(
-        whole(element.get("id", ""), "component: id"), element.get("type", ""), element.get("name", "")
-    )
-    for item in element.iterfind("attribute"):
-        name = item.get("id", "")
+def checked_object(data: Any, where: str) -> dict[str, Any]:
+    """The data, if they are an object with names."""
+    if not isinstance(data, dict):
+        raise DesignFileError("", f"{where}: must be a JSON object")
+    return data
+
+
+def _objects(data: dict[str, Any], key: str) -> list[dict[str, Any]]:
+    found = data.get(key, [])
+    if not isinstance(found, list):
+        raise DesignFileError("", f"{key}: must be a JSON array")
+    return [checked_object(item, key) for item in found]
+
+
+def _component(item: dict[str, Any]) -> Component:
+    number = whole(item.get("id", ""), "component: id")
+    component = Component(number, str(item.get("type", "")), str(item.get("name", "")))
+    current = _EARLIER.get(component.type, {})
+    for attribute in _objects(item, "attributes"):
+        name, unit = str(attribute.get("id", "")), attribute.get("unit")
         try:
-            component.attributes[current(component.type, name)] = Attribute(_value(item), item.get("unit"))
+            value = _value(attribute)
         except ValueError as error:
             raise component.refuse(name, str(error)) from None
+        component.attributes[current.get(name, name)] = Attribute(value, None if unit is None else str(unit))
     return component
 
 
-def _value(element: Element) -> str | tuple[str, ...] | None:
-    array = element.find("array")
-    if array is not None:
-        if array.get("code"):
-            return decoded(array.text or "", array.get("code", ""))
-        return tuple((item.text or "").strip() for item in array.iterfind("c"))
-    return None if len(element) else (element.text or "").strip()
+def _value(attribute: dict[str, Any]) -> str | tuple[str, ...] | None:
+    for kind, value in attribute.items():
+        if kind in _SCALARS:
+            return _text(value)
+        if kind in _ARRAYS:
+            if not isinstance(value, list):
+                raise ValueError(f"{kind} must be a list")
+            return tuple(map(_text, value))
+        if kind.removesuffix("_coded") in _ARRAYS:
+            coded = value if isinstance(value, dict) else {}
+            return decoded(str(coded.get("value", "")), str(coded.get("code", "")))
+    return None
 
 
-def _relation(element: Element) -> Relation:
-    kind = element.get("type", "")
-    order = whole(element.get("order"), "relation: order") if "order" in element.keys() else None
-    return Relation(kind, tuple(_refs(element, kind)), order)
+def _text(value: Any) -> str:
+    if isinstance(value, list | dict):
+        raise ValueError("must be a single value, not a list or an object")
+    return "" if value is None else str(value).lower() if isinstance(value, bool) else value
 
 
-def _refs(element: Element, kind: str) -> Iterator[tuple[str, int]]:
-    for ref in element.iterfind("ref"):
-        yield ref.get("role", ""), whole(ref.get("id", ""), f"relation {element.get('id', '')} ({kind}): ref: id")
+def _relation(item: dict[str, Any]) -> Relation:
+    kind, order = str(item.get("type", "")), item.get("order")
+    where = f"relation {item.get('id', '')} ({kind}): ref: id"
+    refs = tuple((str(ref.get("role", "")), whole(ref.get("id", ""), where)) for ref in _objects(item, "refs"))
+    return Relation(kind, refs, None if order is None else whole(order, "relation: order"))
+
+
+def _data(component: Component) -> dict[str, Any]:
+    held = component.attributes.items()
+    attributes = [{"id": name, "unit": each.unit, each.kind: each.value} for name, each in held]
+    name = {"name": component.name} if component.name else {}
+    return {"id": component.id, "type": component.type, **name, "attributes": attributes}

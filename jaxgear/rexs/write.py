@@ -7,24 +7,26 @@ import equinox as eqx
 import jax
 import numpy as np
 
-from ...contact import MeshCycle
-from ...contact.status import reason
-from ...geometry import GearPair
-from ...microgeometry import AbstractModification
-from ...numerics import check
-from ...numerics.durable import write_durably
-from ..folder import writing
-from .container import SUFFIXES, packed
+from ..contact import MeshCycle
+from ..contact.status import reason
+from ..geometry import GearPair
+from ..io.folder import writing
+from ..microgeometry import AbstractModification
+from ..numerics import check
+from ..numerics.durable import write_durably
+from .archive import SUFFIXES, packed
+from .flanks import write_modification
+from .frame import frames
 from .gears import write_gear
 from .json_form import to_json
+from .model import Model, data_of
 from .results import write_results
-from .rexs_model import Model, xml
-from .values import frames
-from .write_flank import Writer
+from .xml_form import to_xml
 
 _VERSION = "2.0.0"
 _JSON = (".rexsj", ".json")
 _CASE = 1
+_NAMES = "pinion", "wheel"
 
 
 def write_rexs(
@@ -76,7 +78,7 @@ def write_rexs(
     if float(pair.axial_offset) != 0:
         problem = "must be 0 mm: a stage of REXS has no place for it"
         raise ValueError(f"write_rexs: axial_offset = {float(pair.axial_offset):g} mm {problem}")
-    for name, gear in zip(("pinion", "wheel"), pair.gears):
+    for name, gear in zip(_NAMES, pair.gears):
         if gear.protuberance is not None:
             raise ValueError(f"write_rexs: {name} protuberance: must be left out, it is not written yet")
         if gear.cutter_teeth is not None:
@@ -91,14 +93,8 @@ def write_rexs(
         common_face_width=(pair.face_width, "mm"),
     )
     model.relate("assembly", assembly=unit, part=stage)
-    gears, flanks = zip(
-        *(
-            write_gear(model, getattr(pair, name), name, quality, material)
-            for name, quality, material in zip(
-                ("pinion", "wheel"), quality_classes or (None, None), materials or (None, None)
-            )
-        )
-    )
+    names = zip(pair.gears, _NAMES, quality_classes or (None, None), materials or (None, None))
+    gears, flanks = zip(*(write_gear(model, *each) for each in names))
     model.relate("stage", stage=stage, gear_1=gears[0], gear_2=gears[1])
     # of helical gears the ends of the face differ: positive face coordinates are those of right flanks
     touching: dict[str, Any] = {} if pair.is_spur else {"loaded_tooth_flank": ("right", "none")}
@@ -107,9 +103,9 @@ def write_rexs(
     ]
     for gear, part in zip(gears, data):
         model.relate("stage_gear_data", stage=stage, gear=gear, stage_gear_data=part)
-    for name, both, frame, modification in zip(("pinion", "wheel"), flanks, frames(pair), (pinion, wheel)):
+    for name, both, frame, modification in zip(_NAMES, flanks, frames(pair), (pinion, wheel)):
         if modification is not None:
-            Writer(model, both, frame, f"write_rexs: {name}", error).write(modification)
+            write_modification(model, both, frame, modification, owner=f"write_rexs: {name}", error=error)
     if torque is not None:
         check("write_rexs", "torque", torque, "N m", low=0.0)
         model.under_load(_CASE, data[0], torque=(np.asarray(torque), "N m"))
@@ -118,7 +114,7 @@ def write_rexs(
         model.under_load(_CASE, gears[0], rotational_speed=(np.asarray(speed), "1 / min"))
     if cycle is not None:
         write_results(model, data[0], cycle, case=_CASE, speed=speed, friction=friction)
-    text = to_json(model) if Path(path).suffix in _JSON else xml(model)
+    text = (to_json if Path(path).suffix in _JSON else to_xml)(data_of(model))
     if Path(path).suffix in SUFFIXES:
         text = packed(text, f"{Path(path).stem}.rexs")
     with writing(path):

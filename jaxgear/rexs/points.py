@@ -11,7 +11,7 @@ import equinox as eqx
 import numpy as np
 from jaxtyping import Array, Float
 
-from ...microgeometry import (
+from ..microgeometry import (
     AbstractCurve,
     AbstractModification,
     EndRelief,
@@ -33,9 +33,9 @@ from ...microgeometry import (
     TabulatedProfile,
     TipRelief,
 )
-from ...numerics import real
-from .rexs_model import Component
-from .values import Frame
+from ..numerics import real
+from .frame import Frame
+from .model import Component
 
 _SAME = 1e-6  # relative difference that files of fewer digits leave
 # their amounts are proportional to what they remove

@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from ...contact import MeshCycle
-from ...geometry import tooth_thickness
-from ...metrics import flash_temperature
-from ...numerics import over_slices
-from .rexs_model import Component, Model
+from ..contact import MeshCycle
+from ..geometry import tooth_thickness
+from ..metrics import flash_temperature
+from ..numerics import over_slices
+from .model import Component, Model
 
 
 def write_results(

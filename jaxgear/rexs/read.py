@@ -11,19 +11,20 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from ...geometry import GearPair, diameter, path_of_contact
-from ...microgeometry import AbstractModification, NoModification
-from ...numerics import real
-from ..errors import DesignFileError, naming, refused
-from ..toml import content
-from .container import is_container, unpacked
+from ..geometry import GearPair, diameter, path_of_contact
+from ..io.errors import DesignFileError, naming, refused
+from ..io.toml import content
+from ..microgeometry import AbstractModification, NoModification
+from ..numerics import real
+from .archive import is_container, unpacked
+from .flanks import read_modification
+from .frame import Frame, frames
 from .gears import QUALITY, check_external, read_gear, read_quality
 from .json_form import parse_json
+from .model import Component, Model, model_of
 from .open_numbers import FLANK, GEAR, OFFSET, STAGE, Completed
-from .read_flank import read_modification
-from .rexs_model import Component, Model, parse
-from .topography import joined
-from .values import Frame, frames
+from .points import joined
+from .xml_form import parse_xml
 
 _LOG = logging.getLogger("jaxgear")
 _OLDEST, _NEWEST = (1,), (2,)
@@ -105,7 +106,7 @@ def read_rexs(
     """
     file = Path(path)
     with naming(file):
-        model = model_of(file)
+        model = load_model(file)
         completed = Completed(given or {})
         found = _read(model, stage, flank, load_case, completed)
     said = (part for several in (model.components, *model.cases.values()) for part in several.values())
@@ -119,12 +120,13 @@ def read_rexs(
     return found
 
 
-def model_of(file: Path) -> Model:
+def load_model(file: Path) -> Model:
     """The model of a file in XML or JSON, or in a container of one."""
     held = content(file)
     if is_container(held):
         held = unpacked(held)
-    return parse_json(held) if held.removeprefix(BOM_UTF8).lstrip()[:1] == b"{" else parse(held)
+    parse = parse_json if held.removeprefix(BOM_UTF8).lstrip()[:1] == b"{" else parse_xml
+    return model_of(parse(held))
 
 
 def _read(model: Model, stage: int | None, flank: str | None, load_case: int | None, completed: Completed) -> RexsPair:
