@@ -40,8 +40,8 @@ class _Commands(TyperGroup):
         found = super().get_command(ctx, cmd_name)
         place = registry.own().get(cmd_name) if found else registry.provided().get(cmd_name)
         command = None if found or place else provided("commands").get(cmd_name)
-        if found is None and (place or command):
-            function = command.load() if command else _study(place, cmd_name)
+        if found is None and (place is not None or command is not None):
+            function = command.load() if place is None else _study(place, cmd_name)
             alone = typer.Typer(add_completion=False)
             alone.command(cmd_name, help=_unbroken(function))(function)
             found = typer.main.get_command(alone)
@@ -61,7 +61,7 @@ app = typer.Typer(
 )
 
 
-def _unbroken(function: Callable[..., Any]) -> str:
+def _unbroken(function: object) -> str:
     """Docstring of a command: the terminal breaks the lines of a paragraph, not the source."""
     return "\n\n".join(" ".join(paragraph.split()) for paragraph in (function.__doc__ or "").split("\n\n"))
 

@@ -39,14 +39,15 @@ _ARC_ERROR = 0.01  # um: less than any machine holds
 _RELIEFS = (TipRelief, RootRelief, EndRelief)
 _EXACT = (*_RELIEFS, ProfileCrowning, ProfileSlope, LeadCrowning, LeadSlope)
 _SHAPES = {1: "linear", 2: "parabolic"}  # of a relief, by the power of its depth
+_Crowning = tuple[str, tuple[str, ...], tuple[str, ...], str]
 # attributes of a crowning: its shape, both amounts, where they are given, and where nothing is removed
-_PROFILE_CROWNING = (
+_PROFILE_CROWNING: _Crowning = (
     "shape_of_profile_crowning",
     ("profile_crowning_at_root", "profile_crowning_at_tip"),
     tuple(f"diameter_where_profile_crowning_{end}_is_specified" for end in ("root", "tip")),
     "profile_highest_point",
 )
-_HELIX_CROWNING = (
+_HELIX_CROWNING: _Crowning = (
     "shape_of_helix_crowning",
     tuple(f"helix_crowning_amount_{face}" for face in FACES),
     tuple(f"coordinate_where_helix_crowning_is_specified_{face}" for face in FACES),
@@ -140,8 +141,8 @@ def _diameters(frame: Frame, **roll_lengths: float) -> dict[str, Any]:
 def _points(term: AbstractModification, frame: Frame, owner: str, error: float) -> dict[str, tuple[Any, str]]:
     try:
         roll, face, amount = points(term, frame, error)
-    except ValueError as problem:
-        raise DesignFileError(owner, f"{type(term).__name__} {problem}") from None
+    except ValueError as reason:
+        raise DesignFileError(owner, f"{type(term).__name__} {reason}") from None
     diameters, coordinates = np.meshgrid(frame.diameter(roll), face, indexing="ij")
     return {
         "type_of_interpolation_topographical_modification": ("linear", "none"),

@@ -207,9 +207,11 @@ def write_gear(
         **attributes(TOOL, gear),
     )
     settings = model.add(_SETTINGS, f"{name} settings", **{GENERATED: (gear.generating_profile_shift, "none")})
-    sides = "left", "right"
-    flanks = [model.add("cylindrical_gear_flank", f"{name} {side} flank", **attributes(FLANK, gear)) for side in sides]
-    model.relate("flank", gear=part, **dict(zip(sides, flanks)))
+    flanks = [
+        model.add("cylindrical_gear_flank", f"{name} {side} flank", **attributes(FLANK, gear))
+        for side in ("left", "right")
+    ]
+    model.relate("flank", gear=part, left=flanks[0], right=flanks[1])
     for flank in flanks:
         model.relate("manufacturing_step", order=1, workpiece=flank, tool=tool, manufacturing_settings=settings)
     return part, flanks

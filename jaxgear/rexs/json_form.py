@@ -4,12 +4,13 @@ Numbers are read as text, so that their digits are those of the file.
 """
 
 import json
+from collections.abc import Callable
 from typing import Any
 
 from ..io.errors import DesignFileError
 from .model import checked_object
 
-_MAKE = {"floating_point": float, "integer": int, "boolean": "true".__eq__}
+_MAKE: dict[str, Callable[[str], Any]] = {"floating_point": float, "integer": int, "boolean": "true".__eq__}
 
 
 def parse_json(content: bytes) -> dict[str, Any]:
