@@ -39,9 +39,7 @@ class _Commands(TyperGroup):
         """The command of a name; None for an unknown one."""
         found = super().get_command(ctx, cmd_name)
         place = registry.own().get(cmd_name) if found else registry.provided().get(cmd_name)
-        command = None if found or place else provided("commands").get(cmd_name)
-        if found is None and (place is not None or command is not None):
-            function = command.load() if place is None else _study(place, cmd_name)
+        if found is None and (function := _study(place, cmd_name) if place else _named(cmd_name)):
             alone = typer.Typer(add_completion=False)
             alone.command(cmd_name, help=_unbroken(function))(function)
             found = typer.main.get_command(alone)
@@ -59,6 +57,12 @@ app = typer.Typer(
     "130 interrupted (a sweep resumes). Begin with jaxgear new. Guides: examples/guides/index.md of the source; "
     "python -m jaxgear.io prints every table and key of a design file.",
 )
+
+
+def _named(name: str) -> Callable[..., Any] | None:
+    """The function of a command that an entry point names; None for an unknown one."""
+    entry = provided("commands").get(name)
+    return entry.load() if entry else None
 
 
 def _unbroken(function: object) -> str:
