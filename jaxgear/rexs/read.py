@@ -33,7 +33,7 @@ _ALIKE = 1e-9  # um
 _ACTIVE_TIP = "active_tip_diameter"
 _TIPS = "tip_diameter", "tip_form_diameter"
 _ROUNDED = 5e-3  # mm, by which diameters that another program works out may differ
-_LISTED = "jaxgear convert FILE lists its stages"
+_LISTED = "; jaxgear convert FILE lists its stages"
 _NAMES = "pinion", "wheel"
 _ALONG, _ACROSS = "position_of_profile_modification", "diameter_of_helix_modification"
 _GEOMETRY = (
@@ -233,18 +233,21 @@ def _classes(gears: list[Component]) -> tuple[int, int] | None:
 
 def _stage(model: Model, wanted: int | None) -> Component:
     """The stage of an id, or the only one."""
-    stages = [part for part in model.components.values() if part.type == "cylindrical_stage"]
-    known = ", ".join(str(part.id) for part in stages)
+    stages = {part.id: part for part in model.components.values() if part.type == "cylindrical_stage"}
     if not stages:
-        raise DesignFileError("", f"has no cylindrical_stage; {_LISTED}")
-    if wanted is None and len(stages) > 1:
-        raise DesignFileError(
-            "", f"has {len(stages)} cylindrical stages, choose one of {known} by its id (stage); {_LISTED}"
-        )
-    found = [part for part in stages if wanted in (None, part.id)]
-    if not found:
-        raise DesignFileError("", f"has no cylindrical_stage {wanted}, must be one of {known}; {_LISTED}")
-    return found[0]
+        raise DesignFileError("", f"has no cylindrical_stage{_LISTED}")
+    return stages[_chosen("cylindrical_stage", "stage", [*stages], wanted, _LISTED)]
+
+
+def _chosen(kind: str, option: str, known: list[int], wanted: int | None, hint: str = "") -> int:
+    """The wanted one of several ids, or the only one."""
+    names = ", ".join(map(str, known)) or "none"
+    if wanted is None and len(known) > 1:
+        several = f"{len(known)} {kind.replace('_', ' ')}s"
+        raise DesignFileError("", f"has {several}, choose one of {names} by its id ({option}){hint}")
+    if wanted is not None and wanted not in known:
+        raise DesignFileError("", f"has no {kind} {wanted}, must be one of {names}{hint}")
+    return known[0] if wanted is None else wanted
 
 
 def _driving_first(model: Model, stage: Component) -> list[Component]:
@@ -379,13 +382,8 @@ def _sum(parts: list[Component], frame: Frame) -> AbstractModification:
 
 def _load(model: Model, stage: Component, pinion: Component, wanted: int | None) -> tuple[float | None, float | None]:
     """Torque [N m] and speed [rpm] of the pinion."""
-    cases = model.cases
-    known = ", ".join(map(str, cases))
-    if wanted is not None and wanted not in cases:
-        raise DesignFileError("", f"has no load_case {wanted}, must be one of {known or 'none'}")
-    if wanted is None and len(cases) > 1:
-        raise DesignFileError("", f"has {len(cases)} load cases, choose one of {known} by its id (load_case)")
-    case = cases[wanted] if wanted is not None else next(iter(cases.values()), {})
+    none = wanted is None and not model.cases
+    case = {} if none else model.cases[_chosen("load_case", "load_case", [*model.cases], wanted)]
     data = [part.id for part in _data(model, stage, pinion)]
     shafts = [part.id for part in model.related("assembly", "part", pinion.id, "assembly") if part.type == "shaft"]
     torque = _said_of(model, case, data, "torque", "N m")
