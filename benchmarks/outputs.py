@@ -27,7 +27,7 @@ RENAMES: dict[str, str] = {}
 TOLERANCE = 1e-9  # relative
 FLOOR = 1e-12  # absolute: rounding errors in place of zeros
 _UNLIKE = re.compile(r"\b(versions|time_s|seconds|command)\b")  # keys
-_TIMES = re.compile(r"\d s\b|computing time|\bversion\b|applicationVersion|jaxgear \d")  # lines of text
+_PASSING = re.compile(r"\d s\b|computing time|^file = \"/|\bversion\b|applicationVersion|jaxgear \d")  # lines of text
 _COMPARED = (".json", ".csv", ".parquet", ".toml", ".rexs", ".txt")
 _NUMBER = re.compile(r"[-+]?\d+\.?\d*(?:[eE][-+]?\d+)?")
 
@@ -161,7 +161,7 @@ def _of_file(path: Path) -> Iterator[tuple[str, Any]]:
     else:
         seen: Counter[str] = Counter()  # a line is known by its words, so that further lines do not shift the others
         for line in (" ".join(line.split()) for line in text.splitlines()):
-            if not _TIMES.search(line):
+            if not _PASSING.search(line):
                 words = _NUMBER.sub("#", line)
                 seen[words] += 1
                 yield f"{words} [{seen[words]}]", line

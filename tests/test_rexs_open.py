@@ -14,7 +14,7 @@ import pytest
 import jaxgear as jg
 from jaxgear.cli import main
 from jaxgear.io import DesignFileError, load_design
-from jaxgear.rexs import archive as container
+from jaxgear.rexs import forms as container
 from jaxgear.rexs import read_rexs, rexs_stages, write_rexs
 
 PAIR = jg.GearPair(

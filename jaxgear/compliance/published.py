@@ -37,7 +37,7 @@ def coefficients(half_angle: Float[Array, ""], thickness_ratio: Float[Array, ""]
     return jnp.asarray(_TABLE, basis.dtype) @ basis
 
 
-class AbstractFoundation(AbstractBody):
+class _AbstractFoundation(AbstractBody):
     """A body under each tooth on its own: no coupling, and no deflection that all teeth share."""
 
     def compliance(self, load: ToothLoad, step: int, plane: Plane) -> Float[Array, "pairs pairs positions"]:
@@ -55,7 +55,7 @@ class AbstractFoundation(AbstractBody):
         """Deflection times E b / (F cos^2 a), from u_f / S_f of a load."""
 
 
-class Sainsot(AbstractFoundation):
+class Sainsot(_AbstractFoundation):
     """Sainsot's polynomial (legacy): no coupling, hub torsion inside each tooth, plane stress whatever is asked.
 
         delta = F cos^2 a / (E b) { L (u/S)^2 + M u/S + P (1 + Q tan^2 a) },   X = A/t^2 + B h^2 + C h/t + D/t + E h + F
@@ -76,7 +76,7 @@ class Sainsot(AbstractFoundation):
         return bending * arm**2 + mixed * arm + shear * (1 + axial * jnp.tan(load.angle) ** 2)
 
 
-class HalfPlane(AbstractFoundation):
+class HalfPlane(_AbstractFoundation):
     """Half-plane foundation of Weber and Banaschek with Cornell's coefficients: no bore, no coupling.
 
     References:
@@ -106,7 +106,7 @@ class ConstantHertz(AbstractContact):
         return LinearLaw(2e3 / jnp.pi * (1 / geometry.pinion.strain_modulus + 1 / geometry.wheel.strain_modulus))
 
 
-class AbstractLogarithmic(AbstractContact):
+class _AbstractLogarithmic(AbstractContact):
     """A law sum_k 2 q / (pi E'_k) [ bracket_k - ln a ] of the half width a."""
 
     def prepare(self, geometry: ContactGeometry) -> AbstractLaw:
@@ -117,7 +117,7 @@ class AbstractLogarithmic(AbstractContact):
         """Constant part of one body."""
 
 
-class Weber(AbstractLogarithmic):
+class Weber(_AbstractLogarithmic):
     """`DepthReferenced` in its limit h >> a: delta = sum_k 2 q / (pi E'_k) [ ln(2 h_k / a) - nu'_k / 2 ].
 
     References:
@@ -128,7 +128,7 @@ class Weber(AbstractLogarithmic):
         return jnp.log(2 * side.depth) - side.poisson / 2
 
 
-class CenterDistance(AbstractLogarithmic):
+class CenterDistance(_AbstractLogarithmic):
     """Centre-to-centre approach of two cylinders: bracket ln(4 R_k / a) - 1/2 per body. Double counts the tooth bulk.
 
     References:
@@ -139,7 +139,7 @@ class CenterDistance(AbstractLogarithmic):
         return jnp.log(4 * side.radius) - 0.5
 
 
-class Kovalskii(AbstractLogarithmic):
+class Kovalskii(_AbstractLogarithmic):
     """Roark's two cylinders: bracket ln(2 R_k / a) + 0.407 per body. Double counts the tooth bulk.
 
     References:

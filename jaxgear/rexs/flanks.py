@@ -30,9 +30,8 @@ from ..microgeometry import (
 )
 from ..numerics import real
 from .frame import Frame, same
-from .model import Component, Model
+from .model import Component, Model, shifted
 from .points import flank_of, plain_terms, points, powers
-from .values import shifted
 
 FACES = ("datum_face", "non_datum_face")  # at negative and positive face coordinates of a written file
 _ARC_ERROR = 0.01  # um: less than any machine holds

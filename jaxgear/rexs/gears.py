@@ -7,10 +7,9 @@ import numpy as np
 
 from ..geometry import Gear, Material
 from ..io.errors import refused
-from .model import CUSTOM, Component, Model
+from .model import CUSTOM, Component, Model, shifted
 from .open_numbers import FLANK, GEAR, TOOL, Completed, attributes, rack_by_hand
 from .thickness import GENERATED, as_cut, read_thickness, write_thickness
-from .values import shifted
 
 QUALITY = "global_tolerance_class_iso_1328_2013"
 # fields of a gear and of its material: attribute of REXS, its unit and the decimal digits between both units

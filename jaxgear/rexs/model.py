@@ -8,6 +8,8 @@ The data are those of the JSON form with texts in place of numbers: an attribute
 `{"id": "face_width", "unit": "mm", "floating_point": "20.0"}`. The XML form says the same in elements.
 """
 
+import base64
+import binascii
 import math
 import re
 from collections.abc import Iterable
@@ -22,7 +24,6 @@ from ..io.errors import DesignFileError
 from ..io.value_types import outside
 from ..numerics import Number
 from ..version import version as own_version
-from .values import checked_version, decoded, kind_of, whole, written
 
 CUSTOM = "custom_jaxgear_"  # of attributes that REXS does not know: it leaves "custom_..." to programs
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
@@ -206,7 +207,7 @@ class Model:
 
     def add(self, kind: str, name: str = "", **values: tuple[Any, str]) -> Component:
         """A new component; values are (value, unit), those of None are left out."""
-        component = Component(len(self.components) + 1, kind, name, attributes_of(values))
+        component = Component(len(self.components) + 1, kind, name, _attributes_of(values))
         self.components[component.id] = component
         return component
 
@@ -216,11 +217,11 @@ class Model:
 
     def under_load(self, case: int, component: Component, **values: tuple[Any, str]) -> None:
         """Sets the attributes of a component in a load case; values are (value, unit)."""
-        said = Component(component.id, component.type, component.name, attributes_of(values))
+        said = Component(component.id, component.type, component.name, _attributes_of(values))
         self.cases.setdefault(case, {})[component.id] = said
 
 
-def attributes_of(values: dict[str, tuple[Any, str]]) -> dict[str, Attribute]:
+def _attributes_of(values: dict[str, tuple[Any, str]]) -> dict[str, Attribute]:
     """Attributes from (value, unit); those of None are left out."""
     given = {name: pair for name, pair in values.items() if pair[0] is not None}
     return {name: Attribute(written(value), unit, kind_of(name, value, unit)) for name, (value, unit) in given.items()}
@@ -333,3 +334,72 @@ def _data(component: Component) -> dict[str, Any]:
     attributes = [{"id": name, "unit": each.unit, each.kind: each.value} for name, each in held]
     name = {"name": component.name} if component.name else {}
     return {"id": component.id, "type": component.type, **name, "attributes": attributes}
+
+
+_TEXTS = ("model_name",)  # the other words are of lists
+_CODES = {"float64": "<f8", "float32": "<f4", "int32": "<i4"}
+
+
+def kind_of(name: str, value: object, unit: str) -> str:
+    """The type of a value; text is a word of a list, or a number that `shifted` wrote."""
+    if isinstance(value, bool):
+        return "boolean"
+    if name in _TEXTS:
+        return "string"
+    array = np.asarray(value)
+    kind = "integer" if array.dtype.kind == "i" else "floating_point"
+    if array.dtype.kind == "U" and unit == "none":
+        kind = "enum"
+    return f"{kind}_array" if array.ndim else kind
+
+
+def checked_version(version: str) -> str:
+    """The version of a file, if it is one."""
+    if not re.fullmatch(r"\d+(\.\d+){1,2}", version, re.ASCII):
+        raise DesignFileError("model: version", f'"{version}" is not a version of REXS')
+    return version
+
+
+def whole(text: object, where: str) -> int:
+    """A whole number, as ids are."""
+    if not isinstance(text, str) or not re.fullmatch(r"\s*[+-]?\d{1,9}\s*", text, re.ASCII):
+        raise DesignFileError(where, f'"{str(text)[:40]}" is not a whole number')
+    return int(text)
+
+
+def written(value: object) -> str | tuple[str, ...]:
+    """A value as text: numbers by the shortest digits that read back as the same number."""
+    if isinstance(value, str):
+        return value
+    if isinstance(value, bool):
+        return str(value).lower()
+    array = np.asarray(value)
+    return tuple(str(item) for item in array) if array.ndim else str(array[()])
+
+
+def shifted(value: object, shift: int) -> str | tuple[str, ...]:
+    """Numbers times 10^shift as text; the shift is of the decimal digits, so that it is exact."""
+    text = written(value)
+    if isinstance(text, tuple):
+        return tuple(_shift(item, shift) for item in text)
+    return _shift(text, shift)
+
+
+def _shift(text: str, shift: int) -> str:
+    number = Decimal(text)
+    return str(number.scaleb(shift).normalize()) if number else "0.0"
+
+
+def decoded(text: str, code: str) -> tuple[str, ...]:
+    """The numbers of an array in base64, little-endian (REXS 1.4).
+
+    Raises:
+        ValueError: where it is none.
+    """
+    if code not in _CODES:
+        raise ValueError(f'code "{code}" is not known, must be one of {", ".join(_CODES)}')
+    try:
+        content = base64.b64decode("".join(text.split()), validate=True)
+        return tuple(str(item) for item in np.frombuffer(content, _CODES[code]))
+    except (binascii.Error, ValueError):
+        raise ValueError(f"is not an array of {code} in base64") from None

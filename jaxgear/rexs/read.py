@@ -1,7 +1,6 @@
 """Reads a gear pair with its modifications and its load from a REXS file."""
 
 import logging
-from codecs import BOM_UTF8
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import reduce
@@ -16,15 +15,13 @@ from ..io.errors import DesignFileError, naming, refused
 from ..io.toml import content
 from ..microgeometry import AbstractModification, NoModification
 from ..numerics import real
-from .archive import is_container, unpacked
 from .flanks import read_modification
+from .forms import parse
 from .frame import Frame, frames
 from .gears import QUALITY, check_external, read_gear, read_quality
-from .json_form import parse_json
-from .model import Component, Model, model_of
+from .model import Component, Model
 from .open_numbers import FLANK, GEAR, OFFSET, STAGE, Completed
 from .points import joined
-from .xml_form import parse_xml
 
 _LOG = logging.getLogger("jaxgear")
 _OLDEST, _NEWEST = (1,), (2,)
@@ -106,7 +103,7 @@ def read_rexs(
     """
     file = Path(path)
     with naming(file):
-        model = load_model(file)
+        model = parse(content(file))
         completed = Completed(given or {})
         found = _read(model, stage, flank, load_case, completed)
     said = (part for several in (model.components, *model.cases.values()) for part in several.values())
@@ -118,15 +115,6 @@ def read_rexs(
         shown = f"{silent[0]}, the first of {len(silent)}" if len(silent) > 1 else silent[0]
         _LOG.warning("%s: names no units, those of the REXS standard are taken: %s", file, shown)
     return found
-
-
-def load_model(file: Path) -> Model:
-    """The model of a file in XML or JSON, or in a container of one."""
-    held = content(file)
-    if is_container(held):
-        held = unpacked(held)
-    parse = parse_json if held.removeprefix(BOM_UTF8).lstrip()[:1] == b"{" else parse_xml
-    return model_of(parse(held))
 
 
 def _read(model: Model, stage: int | None, flank: str | None, load_case: int | None, completed: Completed) -> RexsPair:

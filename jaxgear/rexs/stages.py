@@ -5,9 +5,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..io.errors import DesignFileError, naming
+from ..io.toml import content
+from .forms import parse
 from .model import Component, Model
 from .open_numbers import Completed
-from .read import load_model, read_stage
+from .read import read_stage
 
 _PAIR = "cylindrical_stage"
 _OTHER = {  # kinds of stages without a pair of their own
@@ -54,7 +56,7 @@ def rexs_stages(path: str | Path) -> tuple[RexsStage, ...]:
         DesignFileError: where the file is not a REXS file.
     """
     with naming(Path(path)):
-        model = load_model(Path(path))
+        model = parse(content(Path(path)))
         return tuple(_stages(model))
 
 

@@ -45,7 +45,7 @@ def made(relief: CycleRelief, free: Sequence[str], vector: Float[Array, " number
     return relief
 
 
-def bounds_of(
+def _bounds_of(
     model: DimensionlessModel, relief: CycleRelief, free: Sequence[str], given: Bounds
 ) -> tuple[Vector, Vector]:
     if set(given) - set(free):
@@ -190,7 +190,7 @@ def dynamic_profile_modification(
     if not names or set(names) - {"amount", "length", "curve"}:
         raise ValueError(f'dynamic_profile_modification: free = {names!r} must name "amount", "length" or "curve"')
     model = with_relief(model, None)
-    low, high = bounds_of(model, relief, names, bounds or {})
+    low, high = _bounds_of(model, relief, names, bounds or {})
     at = real(frequency)
     width = jnp.where(high > low, high - low, 1.0)
     unit = jnp.clip((vector(relief, names) - low) / width, 0.0, 1.0)
