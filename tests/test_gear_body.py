@@ -10,7 +10,7 @@ import pytest
 
 import jaxgear as jg
 from jaxgear.compliance import published, ring
-from jaxgear.compliance.toothload import tooth_load
+from jaxgear.compliance.tooth import tooth_load
 from jaxgear.geometry import outline
 
 # theta_f, root over bore radius: L*, M*, P*, Q* of the published polynomial

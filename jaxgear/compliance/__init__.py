@@ -41,4 +41,4 @@ from .published import Weber as Weber
 from .published import legacy_compliance as legacy_compliance
 from .tooth import AbstractTooth as AbstractTooth
 from .tooth import Beam as Beam
-from .toothload import ToothLoad as ToothLoad
+from .tooth import ToothLoad as ToothLoad

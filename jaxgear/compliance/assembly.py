@@ -14,8 +14,7 @@ from .edge import EdgeLaw, edge
 from .hertz import AbstractContact, ContactGeometry, DepthReferenced
 from .laws import AbstractLaw
 from .plane import Plane, PlaneState, check_plane_state, plane_stress_share, structure_planes
-from .tooth import AbstractTooth, Beam
-from .toothload import ToothLoad
+from .tooth import AbstractTooth, Beam, ToothLoad
 
 Structures = Float[Array, "gears pairs pairs positions"]
 Outside = Float[Array, "pairs positions"]

@@ -14,7 +14,7 @@ from ..numerics import Checked, count, on_both
 from . import ring
 from .plane import Plane, plane_modulus, plane_poisson
 from .plate import axial_compliance
-from .toothload import ToothLoad
+from .tooth import ToothLoad
 
 Matrices = Float[Array, "planes pairs pairs positions"]
 Arcs = Float[Array, "planes pairs 3 3"]

@@ -20,7 +20,7 @@ from ..geometry import reduced_radius
 from ..numerics import Checked, Given, result
 from .laws import AbstractLaw, LogarithmicLaw
 from .plane import Plane, plane_modulus, plane_poisson
-from .toothload import ToothLoad
+from .tooth import ToothLoad
 
 Field = Float[Array, "pairs 1 positions"]
 Real = Float[Array, "..."]

@@ -15,8 +15,7 @@ from .body import AbstractBody
 from .hertz import AbstractContact, ContactGeometry, ContactSide, logarithmic_law
 from .laws import AbstractLaw, LinearLaw, PowerLaw
 from .plane import Plane, check_plane
-from .tooth import Beam
-from .toothload import ToothLoad
+from .tooth import Beam, ToothLoad
 
 Field = Float[Array, "pairs positions"]
 
