@@ -13,7 +13,7 @@ import jaxgear
 
 PACKAGE = Path(jaxgear.__file__).parent
 # folders of the package that no other one imports
-APPLICATIONS = ("rexs", "dynamics/dimensionless")
+APPLICATIONS = ("dimensionless", "rexs")
 # imports every module, shows the help and analyzes a pair
 REST = """
 import pathlib, pkgutil, sys, importlib
@@ -66,7 +66,7 @@ def imported(path: Path):
 
 @pytest.mark.parametrize("folder", APPLICATIONS)
 def test_no_other_module_imports_an_application(folder):
-    application = ".".join(["jaxgear", *folder.split("/")])
+    application = f"jaxgear.{folder}"
     users = [
         path.relative_to(PACKAGE).as_posix()
         for path in PACKAGE.rglob("*.py*")

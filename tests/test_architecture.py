@@ -28,6 +28,7 @@ ORDER = (
     "conditions",
     "revolution",
     "dynamics",
+    "dimensionless",
     "wear",
     "manufacture",
     "vocabulary",
@@ -233,7 +234,7 @@ def test_public_signatures_are_typed():
 
 
 TORQUE_BY_KEYWORD = {
-    "dynamics/dimensionless/model.py dimensionless_model": "that of an excitation",
+    "dimensionless/model.py dimensionless_model": "that of an excitation",
     "io/gearbox.py support_of": "one of the keys of a file",
     "io/write_design.py write_design": "likewise: a file may do without most of them",
     "io/write_design.py write_starter": "likewise",

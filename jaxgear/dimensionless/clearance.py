@@ -7,8 +7,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from ...numerics import Given, check, concrete, number, program, quick_jit, real
-from ..force import AbstractMeshForce
+from ..dynamics.force import AbstractMeshForce
+from ..numerics import Given, check, concrete, number, program, quick_jit, real
 
 Scalar = Float[Array, ""]
 

@@ -7,9 +7,9 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from ...contact.status import Status, status_of
-from ...numerics import Given, Numbers, check, kernel, real, safe_divide, whole
-from ..orbit import Orbit, settled_orbit
+from ..contact.status import Status, status_of
+from ..dynamics.orbit import Orbit, settled_orbit
+from ..numerics import Given, Numbers, check, kernel, real, safe_divide, whole
 from .model import DimensionlessModel, loaded_te
 
 Scalar = Float[Array, ""]

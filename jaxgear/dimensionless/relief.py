@@ -4,9 +4,9 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ...geometry import GearPair, path_of_contact
-from ...microgeometry import AbstractCurve, Linear, TipRelief
-from ...numerics import Checked, Given, check, concrete, number, real
+from ..geometry import GearPair, path_of_contact
+from ..microgeometry import AbstractCurve, Linear, TipRelief
+from ..numerics import Checked, Given, check, concrete, number, real
 
 Scalar = Float[Array, ""]
 

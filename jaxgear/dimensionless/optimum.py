@@ -10,10 +10,10 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int8
 
-from ...contact.status import Statuses, WithStatus
-from ...microgeometry import Linear, Polynomial, Power, Quadratic
-from ...numerics import Checked, Given, Numbers, check, concrete, kernel, real, result, spread, whole
-from ...numerics.pareto import decoded, halton, next_generation, random_strings
+from ..contact.status import Statuses, WithStatus
+from ..microgeometry import Linear, Polynomial, Power, Quadratic
+from ..numerics import Checked, Given, Numbers, check, concrete, kernel, real, result, spread, whole
+from ..numerics.pareto import decoded, halton, next_generation, random_strings
 from .model import DimensionlessModel, with_relief
 from .relief import CycleRelief
 from .settle import _settle, at_rest

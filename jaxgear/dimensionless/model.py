@@ -8,9 +8,9 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, PyTree
 
-from ...numerics import Checked, Given, Numbers, check, number, real
-from ..force import AbstractMeshForce, DeadZone, te_under
-from ..oscillator import Excitation, Oscillator
+from ..dynamics.force import AbstractMeshForce, DeadZone, te_under
+from ..dynamics.oscillator import Excitation, Oscillator
+from ..numerics import Checked, Given, Numbers, check, number, real
 from .clearance import PolynomialClearance, warn_of_false_well
 from .relief import CycleRelief
 

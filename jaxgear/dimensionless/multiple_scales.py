@@ -16,7 +16,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Complex, Float
 
-from ...numerics import Checked, program, real, result, safe_sqrt
+from ..numerics import Checked, program, real, result, safe_sqrt
 from .model import DimensionlessModel, loaded_te
 
 Scalar = Float[Array, ""]

@@ -5,10 +5,10 @@ from typing import Literal
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ...contact import MeshCycle
-from ...metrics import harmonics, secant_stiffness
-from ...numerics import Checked, Given, check, real, result, safe_sqrt
-from ..force import AbstractMeshForce, DeadZone
+from ..contact import MeshCycle
+from ..dynamics.force import AbstractMeshForce, DeadZone
+from ..metrics import harmonics, secant_stiffness
+from ..numerics import Checked, Given, check, real, result, safe_sqrt
 from .model import DimensionlessModel
 
 Scalar = Float[Array, ""]

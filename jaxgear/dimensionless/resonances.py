@@ -6,7 +6,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Complex, Float
 
-from ...numerics import Checked, Given, Numbers, check, program, real, real_roots, result, safe_divide, safe_sqrt, whole
+from ..numerics import Checked, Given, Numbers, check, program, real, real_roots, result, safe_divide, safe_sqrt, whole
 from .model import DimensionlessModel
 from .multiple_scales import LoadedMean, as_complex, effective_forcing, frequency_shift, turned
 
