@@ -31,8 +31,8 @@ def convert(
     """Convert a design file into a REXS file, or a stage of a REXS file into a design file.
 
     REXS is the open exchange format for gearbox data. The gears with their modifications, torque and speed are
-    converted. A file that is there is never replaced. Without OUT the stages of a REXS file are listed, with why those
-    are not converted that are not.
+    converted. An existing file is never replaced. Without OUT the stages of a REXS file are listed, with the reason why
+    a stage is not converted.
     """
     with interrupt.importing():
         from . import convert as conversion

@@ -31,7 +31,7 @@ def convert(
     torque: float | None,
     given: Iterable[str],
 ) -> None:
-    """Converts a file by the ends of both names; a file that is there is never replaced.
+    """Convert a file into the format that the end of the target's name says; an existing file is never replaced.
 
     Without a target it prints the stages of a REXS file.
     """
@@ -89,7 +89,7 @@ def _numbers(given: Iterable[str]) -> dict[str, float]:
 
 
 def _stages(stages: Iterable[RexsStage]) -> Table:
-    """Stages of a file, and why those that are not converted are not."""
+    """Table of the stages of a file, with the reason why a stage is not converted."""
 
     def shown(value: float | None) -> str:
         return "-" if value is None else f"{value:.6g}"

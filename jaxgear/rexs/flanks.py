@@ -63,7 +63,7 @@ def write_modification(
     owner: str,
     error: float,
 ) -> None:
-    """Writes the modification of both flanks of a gear.
+    """Write the modification of both flanks of a gear.
 
     Args:
         model: the file.
@@ -198,7 +198,7 @@ def _end_relief(part: Component, frame: Frame) -> Iterator[AbstractModification]
 
 
 def _relief(part: Component, name: str, length: float, given: float) -> tuple[Any, Any, AbstractCurve]:
-    """Amount, length and curve of a relief, from its depth at another length."""
+    """Amount, length and curve of a relief, from the depth at a given distance from its start."""
     if part.flag("specify_tangential_transition", False):
         raise part.refuse("specify_tangential_transition", "is not supported, must be false")
     shape = part.choice("shape_of_relief", None, ["linear", "parabolic", "circular"])
@@ -245,7 +245,7 @@ def _helix_crowning(part: Component, frame: Frame) -> Iterator[AbstractModificat
 def _crowning(
     part: Component, shape: str, amounts: Iterable[str], lengths: Iterable[float], given: Iterable[float]
 ) -> list[float]:
-    """Amounts [um] at both ends of the flank, from those at given distances from the highest point."""
+    """Amounts [um] at both ends of the flank, from the amounts at given distances from the highest point."""
     found = []
     for name, length, there in zip(amounts, lengths, given):
         _check_arc(part, shape, part.choice(shape, "parabolic", ["parabolic", "circular"]), _amount(part, name), there)
@@ -299,13 +299,13 @@ def _amount(part: Component, name: str) -> float:
 
 
 def _at_end(part: Component, name: str, length: float, given: float, power: int) -> float:
-    """The amount [um] of a power law at another length than that for which it is given [mm]."""
+    """Amount [um] of a power law at a length [mm], from the amount at a given length."""
     amount = _amount(part, name)
     return amount if same(length, given) else amount * (length / given) ** power
 
 
 def _check_arc(part: Component, name: str, shape: str, amount: float, length: float) -> None:
-    """Refuses an arc that is no parabola."""
+    """Raise for an arc of a circle that differs from the parabola."""
     error = abs(amount) * (1e-3 * amount / length) ** 2 / 4
     if shape == "circular" and error > _ARC_ERROR:
         raise part.refuse(name, f'"circular" is {error:.2g} um off the parabola, must be within {_ARC_ERROR:g} um')

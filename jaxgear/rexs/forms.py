@@ -168,7 +168,7 @@ def _tree(content: bytes) -> Element:
 
 
 def _to_xml(data: dict[str, Any]) -> bytes:
-    """The file: UTF-8 with a byte order mark, as REXS has it."""
+    """Content of the file: UTF-8 with a byte order mark."""
     root = Element("model", _attributes(data))
     relations = SubElement(root, "relations")
     for relation in data["relations"]:
@@ -218,7 +218,7 @@ def _from_json(content: bytes) -> dict[str, Any]:
 
 
 def _to_json(data: dict[str, Any]) -> bytes:
-    """The file: UTF-8 with a byte order mark, as REXS has it."""
+    """Content of the file: UTF-8 with a byte order mark."""
     cases = data.get("load_spectrum", {}).get("load_cases", [])
     for component in sum((case["components"] for case in cases), data["components"]):
         component["attributes"] = [_typed(*attribute.items()) for attribute in component["attributes"]]

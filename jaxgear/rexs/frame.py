@@ -54,7 +54,7 @@ class Frame:
         return self.datum * length if face == "datum_face" else -self.datum * length
 
     def side(self, face: str) -> Literal["negative", "positive"]:
-        """At which face coordinates the "datum_face" or the "non_datum_face" is."""
+        """End of the face, by the sign of its coordinate, at which the "datum_face" or the "non_datum_face" is."""
         return "negative" if self.mirror * self.place(face, 1.0) < 0 else "positive"
 
     def removed(

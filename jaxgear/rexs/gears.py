@@ -47,7 +47,7 @@ _ALIKE = 2e-3  # mm, by which diameters on a drawing are rounded
 
 
 def check_external(gear: Component) -> None:
-    """Refuses what is no external gear."""
+    """Raise unless the gear is an external cylindrical gear."""
     if gear.type != "cylindrical_gear":
         raise gear.refuse("", "is an internal gear, must be a cylindrical_gear with external teeth")
     if gear.needed("number_of_teeth", "none") < 0:
@@ -55,7 +55,7 @@ def check_external(gear: Component) -> None:
 
 
 def _helix_angle(gear: Component, pressure_angle: float) -> float:
-    """On the reference cylinder, positive for a right hand [deg], from itself or that on the base cylinder."""
+    """Helix angle on the reference cylinder [deg], given there or on the base cylinder; positive for a right hand."""
     reference, base = (gear.number(name, "deg") for name in _HANDS)
     if base is None:
         return reference or 0.0
@@ -149,7 +149,7 @@ def _complete(
     material: Material,
     completed: Completed,
 ) -> Gear:
-    """The gear of the numbers of a file, None for what it leaves open, which is completed and taken down."""
+    """Gear from the numbers of a file; numbers that are None are completed and noted."""
 
     def made() -> Gear:
         given = {name: value for name, value in options.items() if value is not None}
@@ -183,7 +183,7 @@ def read_quality(gear: Component) -> int | None:
 def write_gear(
     model: Model, gear: Gear, name: str, quality: int | None, material_name: str | None = None
 ) -> tuple[Component, list[Component]]:
-    """Writes a gear; returns its component and those of its left and right flank."""
+    """Write a gear; returns the components of the gear and of its left and right flank."""
     tip = 2 * gear.tip_radius if gear.tip_diameter is None else gear.tip_diameter
     hand = 0.0 if gear.helix_angle is None else gear.helix_angle
     part = model.add(
@@ -250,7 +250,7 @@ def _relative(part: Component, coefficient: str, module: float) -> float | None:
 
 
 def _material(model: Model, gear: Component, owner: str, completed: Completed) -> Material:
-    """The material of a gear; what it does not say is that of gear steel."""
+    """Material of a gear; missing constants are those of gear steel."""
     materials = [
         part for part in model.related("reference", "origin", gear.id, "referenced") if part.type == "material"
     ]

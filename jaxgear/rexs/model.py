@@ -71,7 +71,7 @@ class Attribute:
 
 @dataclass
 class Component:
-    """A part of the gear unit, or something that belongs to one.
+    """Part of the gear unit, or data that belong to a part.
 
     Attributes:
         id: of the file, 0 for what the file does not hold.
@@ -93,11 +93,11 @@ class Component:
         return f"{self.type} {self.id}" + (f": {attribute}" if attribute else "")
 
     def refuse(self, attribute: str, problem: str) -> DesignFileError:
-        """The refusal of an attribute."""
+        """Error for an attribute."""
         return DesignFileError(self.where(attribute), problem)
 
     def missing(self, attribute: str) -> DesignFileError:
-        """The refusal of an attribute that is not there, with the option that gives it."""
+        """Error for a missing attribute, with the option that gives it."""
         key = self.keys.get(attribute)
         return self.refuse(attribute, f"missing, give it with --set {key}=VALUE" if key else "missing")
 
@@ -111,14 +111,14 @@ class Component:
         return self._float(attribute, value, unit, shift)
 
     def needed(self, attribute: str, unit: str) -> float:
-        """A number that has to be there."""
+        """Required number."""
         value = self.number(attribute, unit)
         if value is None:
             raise self.missing(attribute)
         return value
 
     def numbers(self, attribute: str, unit: str, *, shift: int = 0) -> np.ndarray:
-        """An array that has to be there, times 10^shift."""
+        """Required array, times 10^shift."""
         value = self._value(attribute, unit)
         if value is None:
             raise self.missing(attribute)
@@ -127,7 +127,7 @@ class Component:
         return np.array([self._float(attribute, item, unit, shift) for item in value])
 
     def choice(self, attribute: str, default: str | None, allowed: Iterable[str]) -> str:
-        """One of several words, which has to be there where there is no default."""
+        """One of several words, required unless there is a default."""
         value = self._value(attribute, "none") or default
         names = tuple(allowed)
         if value is None:
@@ -198,7 +198,7 @@ class Model:
         return self.components[number]
 
     def related(self, kind: str, role: str, number: int, wanted: str) -> list[Component]:
-        """The components with a wanted role in the relations of a kind in which a component has a role."""
+        """Components with the role `wanted` in relations of a kind where component `number` has the role `role`."""
         found = [
             relation.refs for relation in self.relations if relation.type == kind and (role, number) in relation.refs
         ]
@@ -206,23 +206,23 @@ class Model:
         return [self.component(other) for other in dict.fromkeys(ids)]
 
     def add(self, kind: str, name: str = "", **values: tuple[Any, str]) -> Component:
-        """A new component; values are (value, unit), those of None are left out."""
+        """Add a component; values are (value, unit), None is left out."""
         component = Component(len(self.components) + 1, kind, name, _attributes_of(values))
         self.components[component.id] = component
         return component
 
     def relate(self, kind: str, *, order: int | None = None, **roles: Component) -> None:
-        """A new relation."""
+        """Add a relation."""
         self.relations.append(Relation(kind, tuple((role, part.id) for role, part in roles.items()), order))
 
     def under_load(self, case: int, component: Component, **values: tuple[Any, str]) -> None:
-        """Sets the attributes of a component in a load case; values are (value, unit)."""
+        """Set the attributes of a component in a load case; values are (value, unit)."""
         said = Component(component.id, component.type, component.name, _attributes_of(values))
         self.cases.setdefault(case, {})[component.id] = said
 
 
 def _attributes_of(values: dict[str, tuple[Any, str]]) -> dict[str, Attribute]:
-    """Attributes from (value, unit); those of None are left out."""
+    """Attributes from (value, unit); values that are None are left out."""
     given = {name: pair for name, pair in values.items() if pair[0] is not None}
     return {name: Attribute(written(value), unit, kind_of(name, value, unit)) for name, (value, unit) in given.items()}
 
@@ -275,7 +275,7 @@ def data_of(model: Model) -> dict[str, Any]:
 
 
 def checked_object(data: Any, where: str) -> dict[str, Any]:
-    """The data, if they are an object with names."""
+    """Data of a named object; raises for any other."""
     if not isinstance(data, dict):
         raise DesignFileError("", f"{where}: must be a JSON object")
     return data
@@ -341,7 +341,7 @@ _CODES = {"float64": "<f8", "float32": "<f4", "int32": "<i4"}
 
 
 def kind_of(name: str, value: object, unit: str) -> str:
-    """The type of a value; text is a word of a list, or a number that `shifted` wrote."""
+    """Type of a value by its name in REXS; a text is a word of a list, or a number written by `shifted`."""
     if isinstance(value, bool):
         return "boolean"
     if name in _TEXTS:
@@ -354,14 +354,14 @@ def kind_of(name: str, value: object, unit: str) -> str:
 
 
 def checked_version(version: str) -> str:
-    """The version of a file, if it is one."""
+    """Version of a file; raises for another text."""
     if not re.fullmatch(r"\d+(\.\d+){1,2}", version, re.ASCII):
         raise DesignFileError("model: version", f'"{version}" is not a version of REXS')
     return version
 
 
 def whole(text: object, where: str) -> int:
-    """A whole number, as ids are."""
+    """Whole number, for instance an id; raises for another text."""
     if not isinstance(text, str) or not re.fullmatch(r"\s*[+-]?\d{1,9}\s*", text, re.ASCII):
         raise DesignFileError(where, f'"{str(text)[:40]}" is not a whole number')
     return int(text)

@@ -1,8 +1,8 @@
 """Numbers that a REXS file leaves open: given beside it, or completed.
 
-One rule holds for files of all versions. What a file says is taken. Any number can be given under its key of a design
-file, `pinion.tip_diameter`, and takes the place of that of the file. What is left is completed: the dedendum by the
-root diameter, everything else by what `Gear` has without it, the basic rack of ISO 53 and steel.
+One rule holds for files of all versions. A number given under its key of a design file, `pinion.tip_diameter`, takes
+the place of the file's. Missing numbers are completed: the dedendum by the root diameter, all others by the defaults
+of `Gear`, the basic rack of ISO 53 and steel.
 """
 
 from collections.abc import Mapping
@@ -66,7 +66,7 @@ class Completed:
                 raise DesignFileError("", not_known(key, _KEYS))
 
     def of(self, owner: str, part: Component, keys: Mapping[str, tuple[str, str]]) -> Component:
-        """A component with the numbers that are given of its owner: pinion, wheel or pair."""
+        """Component with the given numbers of its owner (pinion, wheel or pair) in place of its own."""
         attributes = dict(part.attributes)
         for name, (attribute, unit) in keys.items():
             if (key := f"{owner}.{name}") in self.given:
@@ -79,6 +79,6 @@ class Completed:
         return replace(part, attributes=attributes, keys=options)
 
     def say(self, key: str, value: object, why: str) -> None:
-        """Takes down what is completed, with what."""
+        """Note a completed number and its source."""
         shown = f"{value:.6g}" if isinstance(value, float) else value
         self.numbers[key] = f"{shown} ({why})"

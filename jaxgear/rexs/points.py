@@ -92,7 +92,7 @@ def powers(curve: AbstractCurve) -> dict[int, float] | None:
 
 
 def joined(found: Iterable[AbstractModification]) -> list[AbstractModification]:
-    """Modifications with one parabolic relief in place of the linear and the quadratic part that REXS has of it."""
+    """Modifications in which the linear and the quadratic part of a parabolic relief are one relief again."""
     result: list[AbstractModification] = []
     for term in found:
         if result and (one := _parabolic(result[-1], term)) is not None:
@@ -132,7 +132,7 @@ _POINTS = "topographical_modification_amounts"
 
 
 def points(modification: AbstractModification, frame: Frame, error: float) -> tuple[np.ndarray, ...]:
-    """Roll lengths [mm], face coordinates [mm] and amounts [um] of points between which the error [um] is kept.
+    """Roll lengths [mm], face coordinates [mm] and amounts [um] of points whose interpolation keeps the error [um].
 
     Raises:
         ValueError: for a modification with a step.
@@ -202,7 +202,7 @@ def _knots(modification: AbstractModification, frame: Frame) -> tuple[list[float
 
 
 def _merged(places: np.ndarray, more: list[float]) -> np.ndarray:
-    """Increasing, without places that coincide with one of `more` inside the range."""
+    """Increasing places with `more` of them inside the range in place of their close neighbours."""
     low, high = places[0], places[-1]
     wanted = np.array([place for place in more if low < place < high])
     near = 1e-6 * (high - low)
@@ -212,7 +212,7 @@ def _merged(places: np.ndarray, more: list[float]) -> np.ndarray:
 
 
 def _refined(places: np.ndarray, values, scales, error: float) -> np.ndarray:
-    """Places, bisected until linear interpolation on every scale is within the error [um]."""
+    """Places bisected until linear interpolation on every scale is within the error [um]."""
     doubtful = np.ones(len(places) - 1, bool)
     while doubtful.any():
         low, high = places[:-1][doubtful], places[1:][doubtful]
@@ -233,7 +233,7 @@ def _refined(places: np.ndarray, values, scales, error: float) -> np.ndarray:
 
 
 def _bisected(places: np.ndarray, cells: np.ndarray, middle: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Places with the middles of some of their cells, and which of the new cells are halves of those."""
+    """Places with the middles of some cells, and a mask of the new cells that are halves."""
     finer = np.insert(places, cells + 1, middle)
     return finer, np.isin(finer[:-1], middle) | np.isin(finer[1:], middle)
 

@@ -71,35 +71,35 @@ def read_rexs(
     load_case: int | None = None,
     given: Mapping[str, float] | None = None,
 ) -> RexsPair:
-    """Reads an external pair from a REXS file in XML or JSON, or in a zip archive of one (.rexsz).
+    """Read an external pair from a REXS file in XML or JSON, or in a zip archive of one (.rexsz).
 
-    Modifications are those of version 1.4 or later; before, a file that has some is refused.
+    Modifications of version 1.4 or later are read; a file of an earlier version with modifications is refused.
 
-    Both gears are taken as centred on each other unless an axial offset is given. What the file leaves open of a gear
-    is completed, in files of all versions alike, and logged: the dedendum by the root diameter, else that of the basic
-    rack of ISO 53, as the root radius and the addendum; bore and material as those that `Gear` has without them. A
-    modification that is given at other places than the ends of the library's flank goes on to these by its own law.
+    Both gears are centred on each other unless an axial offset is given. Numbers of a gear that the file leaves open
+    are completed, in files of all versions alike, and logged: the dedendum by the root diameter or else by the basic
+    rack of ISO 53, which also gives root radius and addendum; bore and material by the defaults of `Gear`. A
+    modification given at other places than the ends of the library's flank is extended to these by its own law.
 
     Helix angles are positive for a right hand. Left and right flanks are seen from the datum face (ISO 21771): a pinion
-    that drives with its right flanks turns clockwise from there. Face coordinates of the library are then those of the
-    file for a datum face at negative ones, and have the other sign where the left flanks touch or the datum face is at
-    the other end.
+    that drives with its right flanks turns clockwise from there. Face coordinates of the library are those of the file
+    for a datum face at negative coordinates; their sign changes where the left flanks touch, and again where the datum
+    face is at positive coordinates.
 
     Args:
-        path: of the file; of an archive nothing but its one model is read, at most 256 MiB, and nothing is unpacked.
-        stage: id of the cylindrical stage, needed where the file has several.
-        flank: which flanks touch, needed where the left and the right ones are modified differently.
-        load_case: id of the load case, needed where the file has several.
-        given: numbers in place of those of the file, by their keys in a design file and in the units there:
+        path: file; of an archive its one model is read, at most 256 MiB, and nothing is unpacked to the disk.
+        stage: id of the cylindrical stage, needed if the file has several.
+        flank: side of the flanks that touch, needed if the left and the right ones are modified differently.
+        load_case: id of the load case, needed if the file has several.
+        given: numbers in place of the file's, by their keys in a design file and in the units there:
             teeth, module, pressure_angle, profile_shift, helix_angle, face_width, addendum, dedendum, root_radius,
             tip_diameter, tip_form_diameter and bore_diameter of pinion and wheel, as "pinion.tip_diameter",
             "pair.center_distance" and "pair.axial_offset". With dedendum and root_radius the tools of the file are not
             read, with face_width chamfered tooth ends are not.
 
     Raises:
-        DesignFileError: for whatever is wrong with the file or not of this library, in one line that names component
-            and attribute: internal gears, protuberance, chamfers, several tools, shapes of a relief without
-            a formula, missing data, other units, XML that is not well-formed or declares a document type.
+        DesignFileError: for invalid or unsupported content, in one line that names component and attribute: internal
+            gears, protuberance, chamfers, several tools, shapes of a relief without a formula, missing data, other
+            units, XML that is not well-formed or declares a document type.
     """
     file = Path(path)
     with naming(file):
@@ -179,7 +179,7 @@ def read_stage(model: Model, stage: int | None, flank: str | None, completed: Co
 def _with_active_tips(
     model: Model, stage: Component, gears: list[Component], pair: GearPair, completed: Completed
 ) -> GearPair:
-    """The pair whose flanks end at the active tip diameters of its stage, where no other number ends them there."""
+    """Pair whose flanks end at the active tip diameters of its stage, unless a tip form diameter is given."""
     said = [[(part, part.number(_ACTIVE_TIP, "mm")) for part in _data(model, stage, gear)] for gear in gears]
     if not any(value for parts in said for _, value in parts):
         return pair
@@ -200,7 +200,7 @@ def _with_active_tips(
 
 
 def _with_given(model: Model, gears: list[Component], completed: Completed) -> list[Component]:
-    """Pinion and wheel with the numbers that are given, which their flanks have in the model too."""
+    """Pinion and wheel with the given numbers; the flanks in the model get their given numbers too."""
     for owner, gear in zip(_NAMES, gears):
         for side in ("left", "right"):
             for flank in model.related("flank", "gear", gear.id, side):
@@ -228,7 +228,7 @@ def _stage(model: Model, wanted: int | None) -> Component:
 
 
 def _chosen(kind: str, option: str, known: list[int], wanted: int | None, hint: str = "") -> int:
-    """The wanted one of several ids, or the only one."""
+    """The wanted id, or the first one if none is wanted; raises where the choice is open."""
     names = ", ".join(map(str, known)) or "none"
     if wanted is None and len(known) > 1:
         several = f"{len(known)} {kind.replace('_', ' ')}s"
@@ -252,7 +252,7 @@ def _data(model: Model, stage: Component, gear: Component) -> list[Component]:
 
 
 def _loaded(model: Model, stage: Component, gears: list[Component]) -> str | None:
-    """Which flanks touch, where the file says so."""
+    """Side of the flanks that touch; None if the file names none."""
     sides = {part.text("loaded_tooth_flank") for gear in gears for part in _data(model, stage, gear)} - {""}
     if len(sides) > 1:
         raise stage.refuse("loaded_tooth_flank", "differs between its gears, must be the same: left touches left")
@@ -260,7 +260,7 @@ def _loaded(model: Model, stage: Component, gears: list[Component]) -> str | Non
 
 
 def _check_axes(gears: list[Component]) -> None:
-    """Refuses gears that count along their faces in opposite directions."""
+    """Raise for gears whose axes point in opposite directions."""
     axes = [gear.numbers("u_axis_vector", "mm") for gear in gears if "u_axis_vector" in gear.attributes]
     if len(axes) == 2 and (axes[0].shape != axes[1].shape or not axes[0] @ axes[1] > 0):
         raise gears[1].refuse("u_axis_vector", f"must point in the direction of that of gear {gears[0].id}")
@@ -297,7 +297,7 @@ def _flank(model: Model, gear: Component, wanted: str | None) -> Component:
 
 
 def _said(model: Model, flank: Component) -> list[str]:
-    """Everything that the modifications of a flank say, in an order that depends on nothing else."""
+    """Sorted texts of all modifications of a flank, to compare two flanks."""
     parts = model.related("reference", "origin", flank.id, "referenced")
     return sorted(f"{part.type} {sorted(part.attributes.items())}" for part in parts)
 
@@ -325,13 +325,13 @@ def _modification(model: Model, gear: Component, flank: Component, frame: Frame)
 
 
 def _differ(frame: Frame, one: AbstractModification, other: AbstractModification, sign: int = 1) -> bool:
-    """Whether two modifications remove something else, at face coordinates of the same or the other sign."""
+    """Whether two modifications differ, the second one at face coordinates times `sign`."""
     roll, face = np.meshgrid(np.linspace(frame.start, frame.tip, 33), np.linspace(-0.5, 0.5, 61) * frame.width)
     return bool(np.abs(frame.removed(one, roll, face) - frame.removed(other, roll, sign * face)).max() > _ALIKE)
 
 
 def _datum(gear: Component) -> int:
-    """At which end of the face the datum face is: -1 or 1."""
+    """Sign of the face coordinate of the datum face: -1 or 1."""
     return -1 if gear.choice("datum_face_orientation", "negative", ["negative", "positive"]) == "negative" else 1
 
 
@@ -347,7 +347,7 @@ def _check_direction(
     sides: list[tuple[Component, Component, Frame]],
     modifications: tuple[AbstractModification, AbstractModification],
 ) -> None:
-    """Refuses helical gears where it matters and is not known which end of the face enters the mesh first."""
+    """Raise for helical gears with uneven ends of the face whose loaded flank or orientation is ambiguous."""
     uneven = [
         gear
         for (gear, _, frame), modification in zip(sides, modifications)
@@ -380,7 +380,7 @@ def _load(model: Model, stage: Component, pinion: Component, wanted: int | None)
 
 
 def _said_of(model: Model, case: dict[int, Component], ids: list[int], name: str, unit: str) -> float | None:
-    """Size of a number that the first of several components names, in the load case or without one."""
+    """Absolute value of a number of the first component that has it, in the load case or else outside of it."""
     for number in ids:
         for part in (case.get(number), model.component(number)):
             value = None if part is None else part.number(name, unit)

@@ -24,15 +24,15 @@ class RexsStage:
     """One stage of a REXS file.
 
     Attributes:
-        id: of its component, which `read_rexs` and the option --stage take.
+        id: id of its component, for `read_rexs` and the option --stage.
         kind: type of its component.
-        name: of the component, "" without one.
-        teeth: numbers of teeth, gear 1 first; None where the file names none.
-        module: normal module of gear 1 [mm], None where the file names none.
-        helix_angle: of gear 1 on the reference cylinder [deg], likewise.
-        center_distance: [mm], likewise.
-        completed: numbers that the file leaves open and `read_rexs` takes, in words, by their keys in a design file.
-        problem: why the stage is not read, "" where it is.
+        name: name of its component, "" without one.
+        teeth: numbers of teeth, gear 1 first; None if the file gives none.
+        module: normal module of gear 1 [mm]; None if the file gives none.
+        helix_angle: helix angle of gear 1 on the reference cylinder [deg]; None if the file gives none.
+        center_distance: centre distance [mm]; None if the file gives none.
+        completed: descriptions of the numbers that `read_rexs` completes, by their keys in a design file.
+        problem: reason why the stage cannot be read, "" for none.
     """
 
     id: int
@@ -47,7 +47,7 @@ class RexsStage:
 
 
 def rexs_stages(path: str | Path) -> tuple[RexsStage, ...]:
-    """Every stage of a REXS file, with why it is not read where that is so.
+    """Every stage of a REXS file, with the reason why a stage cannot be read.
 
     Args:
         path: of the file, see `read_rexs`.
@@ -90,7 +90,7 @@ def _stage(model: Model, stage: Component) -> RexsStage:
 
 
 def _number(part: Component, attribute: str, unit: str) -> float | None:
-    """A number as far as it can be read: what is wrong with it is among the problems of the stage."""
+    """Number of a component, None if it cannot be read."""
     try:
         return part.number(attribute, unit)
     except DesignFileError:

@@ -72,7 +72,7 @@ def read_thickness(gear: Component, made: Gear) -> dict[str, Any]:
 def _deviations(
     gear: Component, made: Gear
 ) -> Iterator[tuple[tuple[str, str], list[float | None], Callable[..., Any]]]:
-    """Names of the limits, upper one first, what they say [mm], and the allowance on the arc [um] for one of them."""
+    """Names of both limits, upper one first, their values, and the function from a value to the allowance [um]."""
     yield CHORDS, [gear.number(name, "mm") for name in CHORDS], lambda chord: _of_chord(made, chord)
     cosine = float(np.cos(np.deg2rad(made.pressure_angle)))
     yield SPANS, [gear.number(name, "mum") for name in SPANS], lambda span: span / cosine
@@ -82,7 +82,7 @@ def _deviations(
 
 
 def as_cut(settings: Component, made: Gear, owner: str, completed: Completed) -> Gear:
-    """The gear with the tooth thickness of its generating profile shift, where no deviation tells another.
+    """Gear with the tooth thickness by its generating profile shift, unless deviations of the thickness are given.
 
     x_E = x + A_sn / (2 m_n tan(alpha_n)) (ISO 21771) of a file is that of an allowance A_sn between both limits.
     """
@@ -116,7 +116,7 @@ def _nominal(gear: Gear) -> tuple[float, float]:
 
 
 def _of_chord(made: Gear, chord: float) -> float:
-    """The allowance on the arc of the reference circle [um] of one on the chord [mm]."""
+    """Allowance on the arc of the reference circle [um], from the allowance on the chord [mm]."""
     diameter, arc = _nominal(made)
     if not -arc < chord < arc:
         raise ValueError(f"{chord:g} mm must be greater than {-arc:.4g} mm and at most 0 mm")

@@ -41,19 +41,18 @@ def write_rexs(
     title: str = "",
     error: float = 0.01,
 ) -> None:
-    """Writes a REXS 2.0 file. It appears as a whole or not at all, in place of an earlier one.
+    """Write a REXS 2.0 file atomically, in place of an earlier one.
 
-    What the pair leaves open, tip diameters and centre distance, is written as the numbers that it means; a bore that
-    is left open is left out. Both flanks of a tooth are modified alike. What REXS has no place for, the radius of the
-    tip edges, goes into attributes of the name `custom_jaxgear_...`, which REXS leaves to programs.
+    Tip diameters and centre distance that the pair leaves open are written with their values; an open bore is left
+    out. Both flanks of a tooth are modified alike. The radius of the tip edges, which REXS does not know, is written as
+    `custom_jaxgear_tip_edge_radius`: REXS leaves the names "custom_..." to programs.
 
     Args:
-        path: of the file, in JSON where it ends in .rexsj or .json, else in XML; in a zip archive where it ends in
-            .rexsz or .zip.
+        path: file; the end .rexsj or .json makes it JSON, .rexsz or .zip an archive of an XML file, any other end XML.
         pair: gear pair; the pinion is gear 1 of the stage.
         pinion, wheel: modifications of the flanks.
-        torque: on the pinion [N m].
-        speed: of the pinion [rpm].
+        torque: torque on the pinion [N m].
+        speed: speed of the pinion [rpm].
         cycle: solved mesh cycle of the pair, whose line load and Hertzian stress are written, with a speed also sliding
             velocity and flash temperature; its modifications, torque and speed are those of the file.
         friction: mean coefficient of friction for the flash temperature; None for that of the cycle, or the library's.
@@ -117,7 +116,7 @@ def write_rexs(
 
 
 def _of_cycle(pair, cycle: MeshCycle, pinion, wheel, torque, speed, friction):
-    """Modifications, torque, speed and friction of a mesh cycle that can be written; raises for any other."""
+    """Modifications, torque, speed and friction of a mesh cycle; raises if they cannot be written."""
     for name, given in (("pinion", pinion), ("wheel", wheel), ("torque", torque)):
         if given is not None:
             raise ValueError(f"write_rexs: {name} has no effect with cycle, leave it out")
@@ -146,7 +145,7 @@ def _of_cycle(pair, cycle: MeshCycle, pinion, wheel, torque, speed, friction):
 def _write_results(
     model: Model, stage_data: Component, cycle: MeshCycle, *, case: int, speed: float | None, friction: float | None
 ) -> None:
-    """Writes line load and Hertzian stress, with a speed sliding velocity and flash temperature too.
+    """Write line load and Hertzian stress, with a speed also sliding velocity and flash temperature.
 
     They belong to points of the pinion flank: radius, angle from the centreline of the tooth in its transverse section
     and face coordinate from the middle of the face, profile after profile across the face. Points are where contact is
