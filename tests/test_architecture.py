@@ -41,6 +41,7 @@ ORDER = (
     "report",
     "studies",
     "cli",
+    "identification",
     "rexs",
 )
 FILES = sorted(PACKAGE.rglob("*.py"))
@@ -168,6 +169,7 @@ def test_numerics_has_no_gear_word():
 
 # public functions and methods that do not say the type of every parameter and of their result, and why
 OF_ANY_TYPE = {
+    "cli/app.py run_place": "passes the options of a study on",
     "contact/status.py WithStatus.converged": "of the kind of array that the status is, of JAX or NumPy",
     "contact/solve.py contact_of": "takes forces or approaches, each of a type of its own",
     "dynamics/runs.py design_runs": "designs are a tree of arrays of any kind, options those of another function",

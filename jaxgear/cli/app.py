@@ -123,7 +123,7 @@ def new(
     return OK
 
 
-def _run(
+def run_place(
     place: str,
     context: typer.Context,
     file: Path,
@@ -176,7 +176,7 @@ def _study(place: str, name: str) -> Callable[..., int]:
         no_cache: NoCache = False,
     ) -> int:
         shared = {"no_figures": no_figures, "reported": reported, "no_cache": no_cache}
-        return _run(place, context, file, output, **shared, quick=quick)
+        return run_place(place, context, file, output, **shared, quick=quick)
 
     return command
 
@@ -192,7 +192,7 @@ def analyze(
 ) -> int:
     """Analyze the unmodified pair and the modification of the design file."""
     shared = {"no_figures": no_figures, "reported": reported, "no_cache": no_cache}
-    return _run("jaxgear.studies.design_analysis:DesignAnalysis", context, file, output, **shared)
+    return run_place("jaxgear.studies.design_analysis:DesignAnalysis", context, file, output, **shared)
 
 
 @app.command()
@@ -215,43 +215,7 @@ def optimize(
     """
     shared = {"no_figures": no_figures, "reported": reported, "no_cache": no_cache}
     place = "jaxgear.studies.optimization:DesignOptimization"
-    return _run(place, context, file, output, **shared, method=method, quick=quick)
-
-
-@app.command()
-def identify(
-    context: typer.Context,
-    file: File,
-    measured: Annotated[
-        Path, typer.Argument(metavar="TE.csv", help="Measured transmission error.", show_default=False)
-    ],
-    output: Annotated[Path | None, output_option("identify")] = None,
-    noise: Annotated[
-        float | None, typer.Option(metavar="UM", help="Standard deviation of a reading in um; else that of repeats.")
-    ] = None,
-    torque_scale: Annotated[
-        float, typer.Option(metavar="SD", help="Standard deviation of true over measured torque, 0 for a right one.")
-    ] = 0.01,
-    offset: Annotated[
-        float, typer.Option(metavar="UM", help="Standard deviation of an offset of all readings in um, 0 for none.")
-    ] = 0.0,
-    pitch: Annotated[
-        bool, typer.Option("--pitch", help="Pitch deviations are unknown too, from readings of whole revolutions.")
-    ] = False,
-    quick: Quick = False,
-    no_figures: NoFigures = False,
-    reported: Reported = False,
-    no_cache: NoCache = False,
-) -> int:
-    """Find the values of the variables that gave a measured transmission error, and how well it tells them.
-
-    The file has the columns torque_Nm, te_um, and phase (base pitches) or angle_deg (of the pinion). An error that is
-    an angle names its shaft and unit: te_wheel_arcsec, te_pinion_deg.
-    """
-    shared = {"no_figures": no_figures, "reported": reported, "no_cache": no_cache}
-    unknown: dict[str, Any] = {"noise": noise, "torque_scale": torque_scale, "offset": offset, "pitch": pitch}
-    place = "jaxgear.studies.identification:DesignIdentification"
-    return _run(place, context, file, output, **shared, measured=measured, quick=quick, **unknown)
+    return run_place(place, context, file, output, **shared, method=method, quick=quick)
 
 
 for _name, _place in registry.own().items():

@@ -10,7 +10,6 @@ from .folder import result_folder as result_folder
 from .folder import writing as writing
 from .layout_table import LayoutRequest as LayoutRequest
 from .layout_table import layout_request as layout_request
-from .measured_te import read_measurement as read_measurement
 from .named_quantities import quantities_of_tables as quantities_of_tables
 from .optimize_table import OptimizeRequest as OptimizeRequest
 from .optimize_table import optimize_request as optimize_request

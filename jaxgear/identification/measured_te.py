@@ -6,12 +6,12 @@ from pathlib import Path
 import numpy as np
 
 from ..geometry import GearPair
+from ..io.errors import DesignFileError, naming, problem
+from ..io.flanks import numbers_of
+from ..io.headings import ANGLES, Column, converted, parts
+from ..io.rows import read_rows
 from ..numerics import optional_real, real
-from ..optimize import Measurement
-from .errors import DesignFileError, naming, problem
-from .flanks import numbers_of
-from .headings import ANGLES, Column, converted, parts
-from .rows import read_rows
+from .measurement import Measurement
 
 _PHASE, _ANGLE, _TORQUE, _ERROR = "phase", "angle_deg", "torque_Nm", "te_um"
 _TURN, _TE = "revolution", "transmission_error"

@@ -11,21 +11,23 @@ import equinox as eqx
 import numpy as np
 
 from ..contact import Mesh, Resolution
-from ..io import DesignFile, DesignFileError, read_measurement, write_design, write_flanks
+from ..io import DesignFile, DesignFileError, write_design, write_flanks
 from ..io.design_file import FileDesign
 from ..io.errors import naming, problem, refused
 from ..io.tolerance_table import quality_classes
 from ..microgeometry import AbstractModification, EndRelief, LeadCrowning, LeadSlope
 from ..numerics import check, real
-from ..optimize import Identified, Measurement, identify, period_of
 from ..provided import provided
 from ..report import Table
+from ..studies.checkpoints import Checkpoints
+from ..studies.evaluation import coarse
+from ..studies.progress import Stages
+from ..studies.study import AbstractStudy, AbstractStudyResult
+from ..studies.summary_data import flanks_data
 from ..tolerance import ToleranceClass
-from .checkpoints import Checkpoints
-from .evaluation import coarse
-from .progress import Stages
-from .study import AbstractStudy, AbstractStudyResult
-from .summary_data import flanks_data
+from .estimate import Identified, identify, period_of
+from .measured_te import read_measurement
+from .measurement import Measurement
 
 _OF_LIMIT = 3.0  # limit deviation over standard deviation: nearly all gears of a class keep its limits
 _OF_RANGE = 4.0  # range of a variable over standard deviation
@@ -89,7 +91,7 @@ class DesignIdentification(AbstractStudy["IdentificationResult"]):
 
         Args:
             design: the design file.
-            measured: file of the measurement, see `io.read_measurement`.
+            measured: file of the measurement, see `read_measurement`.
             quick: True for a preview on few positions.
             noise: standard deviation of a reading [um]; None estimates it from repeated readings.
             torque_scale: standard deviation of the ratio of true to measured torque; 0 for an exact torque.
