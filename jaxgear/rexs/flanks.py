@@ -10,7 +10,7 @@ The exponential and the logarithmic shape are refused: REXS names them without a
 """
 
 from collections.abc import Callable, Iterable, Iterator
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -35,23 +35,97 @@ from .points import flank_of, plain_terms, points, powers
 
 FACES = ("datum_face", "non_datum_face")  # at negative and positive face coordinates of a written file
 _ARC_ERROR = 0.01  # um: less than any machine holds
-_RELIEFS = (TipRelief, RootRelief, EndRelief)
-_EXACT = (*_RELIEFS, ProfileCrowning, ProfileSlope, LeadCrowning, LeadSlope)
 _SHAPES = {1: "linear", 2: "parabolic"}  # of a relief, by the power of its depth
-_Crowning = tuple[str, tuple[str, ...], tuple[str, ...], str]
-# attributes of a crowning: its shape, both amounts, where they are given, and where nothing is removed
-_PROFILE_CROWNING: _Crowning = (
-    "shape_of_profile_crowning",
-    ("profile_crowning_at_root", "profile_crowning_at_tip"),
-    tuple(f"diameter_where_profile_crowning_{end}_is_specified" for end in ("root", "tip")),
-    "profile_highest_point",
-)
-_HELIX_CROWNING: _Crowning = (
-    "shape_of_helix_crowning",
-    tuple(f"helix_crowning_amount_{face}" for face in FACES),
-    tuple(f"coordinate_where_helix_crowning_is_specified_{face}" for face in FACES),
-    "helix_highest_point",
-)
+_RELIEFS = {TipRelief: "tip", RootRelief: "root"}
+_CROWNINGS = {ProfileCrowning: "profile_crowning", LeadCrowning: "helix_crowning"}
+_EXACT = {*_RELIEFS, EndRelief, *_CROWNINGS, ProfileSlope, LeadSlope}
+_TOO_FAR = {
+    "tip": "must be less than the tip diameter and where the depth is given",
+    "root": "must be greater than the diameter where the depth is given",
+}
+
+
+class _Rise(NamedTuple):
+    """Amount of a component that rises from an origin to one end of the flank, with the names of its attributes.
+
+    Places count towards that end [mm]: roll lengths towards the tip, negative ones towards the root, and distances from
+    the middle of the face towards either face.
+
+    Attributes:
+        end: "tip", "root", "datum_face" or "non_datum_face".
+        amount: attribute of the amount.
+        place: attribute of the place where the amount is given: a diameter, or a face coordinate.
+        origin: attribute of the place where the rise begins; of an end relief of its length.
+    """
+
+    end: str
+    amount: str
+    place: str
+    origin: str
+
+    @property
+    def on_face(self) -> bool:
+        """True for a rise over the face."""
+        return self.end in FACES
+
+    def end_place(self, frame: Frame) -> float:
+        """Place of the end."""
+        return {"tip": frame.tip, "root": -frame.start}.get(self.end, 0.5 * frame.width)
+
+    def written(self, frame: Frame, place: float) -> Any:
+        """Diameter or face coordinate of a place."""
+        return frame.place(self.end, place) if self.on_face else frame.diameter(place)
+
+    def read(self, part: Component, name: str, frame: Frame) -> float | None:
+        """Place in an attribute; None where that is absent."""
+        value = part.number(name, "mm")
+        if value is None:
+            return None
+        if self.on_face:
+            return frame.place(self.end, value)
+        found = float(frame.roll_length(value))
+        if not found >= 0:
+            raise part.refuse(name, f"{value:g} mm must be at least {2 * frame.base_radius:g} mm, the base diameter")
+        return found if self.end == "tip" else -found
+
+    def needed(self, part: Component, name: str, frame: Frame) -> float:
+        """Place in a required attribute."""
+        found = self.read(part, name, frame)
+        if found is None:
+            raise part.refuse(name, "missing")
+        return found
+
+    def given_place(self, part: Component, frame: Frame) -> float:
+        """Place where the amount is given: required at the root, else by default the end of the flank."""
+        if self.end == "root":
+            return self.needed(part, self.place, frame)
+        found = self.read(part, self.place, frame)
+        return self.end_place(frame) if found is None else found
+
+    def relief(self, frame: Frame, amount: float, length: float, curve: AbstractCurve) -> AbstractModification:
+        """The relief at this end of the flank."""
+        numbers = real(amount), real(length), curve
+        if self.on_face:
+            return EndRelief(*numbers, side=frame.side(self.end))
+        return (TipRelief if self.end == "tip" else RootRelief)(*numbers)
+
+
+# one table for both ways: type of a component, its ends of the flank, and the attributes of the rise to an end
+_NAMES = (
+    ("{}_relief", ("tip", "root"), "{}_relief_depth {}_relief_evaluation_reference {}_relief_datum_diameter"),
+    ("end_relief_{}", FACES, "end_relief_depth_{} end_relief_evaluation_reference_{} end_relief_length_{}"),
+    ("profile_crowning", ("root", "tip"), "profile_crowning_at_{} diameter_where_profile_crowning_{}_is_specified "
+     "profile_highest_point"),
+    ("helix_crowning", FACES, "helix_crowning_amount_{} coordinate_where_helix_crowning_is_specified_{} "
+     "helix_highest_point"),
+    ("profile_slope", ("tip",), "profile_slope diameter_where_profile_slope_amount_is_specified "
+     "profile_evaluation_start"),
+)  # fmt: skip
+_RISES: dict[str, list[_Rise]] = {}
+for _kind, _ends, _attributes in _NAMES:
+    for _end in _ends:
+        _rise = _Rise(_end, *(name.format(_end) for name in _attributes.split()))
+        _RISES.setdefault(_kind.format(_end), []).append(_rise)
 
 
 def write_modification(
@@ -85,56 +159,49 @@ def write_modification(
 
 def _components(term: Any, frame: Frame, owner: str, error: float) -> Iterator[tuple[str, dict[str, tuple[Any, str]]]]:
     """Types of the components of a term, with (value, unit) of their attributes."""
-    relief = type(term) in _RELIEFS
+    relief = hasattr(term, "curve")
     shares = powers(term.curve) if relief else {0: 1.0}
     if type(term) not in _EXACT or shares is None or (isinstance(term, TipRelief) and frame.tip < float(term.length)):
         yield "topographical_modification", _points(term, frame, owner, error)
     elif not relief or float(term.length) > 0:
         for power, share in shares.items():
             amount = shifted(np.asarray(term.amount) if share == 1 else share * np.asarray(term.amount), -3), "mm"
-            shape = {"shape_of_relief": _SHAPES[power]} if relief else {}
-            for kind, words, amounts, lengths in _exact(term, frame):
-                said = {name: (word, "none") for name, word in (shape | words).items()}
-                yield kind, said | dict.fromkeys(amounts, amount) | {n: (mm, "mm") for n, mm in lengths.items()}
+            shape = {"shape_of_relief": (_SHAPES[power], "none")} if relief else {}
+            for kind, amounts, lengths, words in _exact(term, frame):
+                values = {name: (length, "mm") for name, length in lengths.items()}
+                yield kind, shape | words | dict.fromkeys(amounts, amount) | values
 
 
-def _exact(term: Any, frame: Frame) -> list[tuple[str, dict[str, str], Iterable[str], dict[str, Any]]]:
-    """Types of the components of a term, words, attributes of the amount, lengths [mm]; words and lengths by name."""
-    start, tip, half = frame.start, frame.tip, 0.5 * frame.width
-    length = float(getattr(term, "length", 0.0))
-    match term:
-        case TipRelief():
-            ends = _diameters(frame, tip_relief_datum_diameter=tip - length, tip_relief_evaluation_reference=tip)
-            return [("tip_relief", {}, ["tip_relief_depth"], ends)]
-        case RootRelief():
-            ends = _diameters(frame, root_relief_datum_diameter=start + length, root_relief_evaluation_reference=start)
-            return [("root_relief", {}, ["root_relief_depth"], ends)]
-        case EndRelief():
-            return [
-                (f"end_relief_{face}", {}, [f"end_relief_depth_{face}"], {
-                    f"end_relief_length_{face}": length,
-                    f"end_relief_evaluation_reference_{face}": frame.place(face, half),
-                })
-                for face, side in zip(FACES, ("negative", "positive"))
-                if term.side in ("both", side)
-            ]  # fmt: skip
-        case ProfileCrowning():
-            shape, amounts, places, top = _PROFILE_CROWNING
-            ends = _diameters(frame, **dict(zip((*places, top), (start, tip, 0.5 * (start + tip)))))
-            return [("profile_crowning", {shape: "parabolic"}, amounts, ends)]
-        case LeadCrowning():
-            shape, amounts, places, top = _HELIX_CROWNING
-            return [("helix_crowning", {shape: "parabolic"}, amounts, dict(zip((*places, top), (-half, half, 0.0))))]
-        case ProfileSlope():
-            given = "diameter_where_profile_slope_amount_is_specified"
-            ends = _diameters(frame, profile_evaluation_start=start, profile_evaluation_end=tip, **{given: tip})
-            return [("profile_slope", {}, ["profile_slope"], ends)]
-    words = {"helix_evaluation_reference": "helix_evaluation_length"}
-    return [("helix_slope", words, ["helix_slope"], {"helix_evaluation_start": -half, "helix_evaluation_end": half})]
-
-
-def _diameters(frame: Frame, **roll_lengths: float) -> dict[str, Any]:
-    return {name: frame.diameter(roll_length) for name, roll_length in roll_lengths.items()}
+def _exact(term: Any, frame: Frame) -> Iterator[tuple[str, list[str], dict[str, Any], dict[str, tuple[str, str]]]]:
+    """Types of the components of a term, attributes of its amount, lengths [mm] and (word, unit) by their names."""
+    half = 0.5 * frame.width
+    if isinstance(term, LeadSlope):
+        words = {"helix_evaluation_reference": ("helix_evaluation_length", "none")}
+        yield "helix_slope", ["helix_slope"], {"helix_evaluation_start": -half, "helix_evaluation_end": half}, words
+        return
+    if isinstance(term, ProfileSlope):
+        kinds, words = ["profile_slope"], {}
+    elif crowning := _CROWNINGS.get(type(term)):
+        kinds, words = [crowning], {f"shape_of_{crowning}": ("parabolic", "none")}
+    elif end := _RELIEFS.get(type(term)):
+        kinds, words = [f"{end}_relief"], {}
+    else:
+        sides = zip(FACES, ("negative", "positive"))
+        kinds, words = [f"end_relief_{face}" for face, side in sides if term.side in ("both", side)], {}
+    for kind in kinds:
+        rises = _RISES[kind]
+        ends = [rise.end_place(frame) for rise in rises]
+        # between both ends, at the start of the evaluation range, or by the length of a relief from its end
+        origin = 0.5 * (ends[-1] - ends[0]) if len(rises) > 1 else frame.start
+        lengths = {rise.place: rise.written(frame, end) for rise, end in zip(rises, ends)}
+        if kind == "profile_slope":
+            lengths["profile_evaluation_end"] = frame.diameter(frame.tip)
+        if hasattr(term, "length"):
+            origin = ends[0] - float(term.length)
+        last = rises[-1]
+        by_length = last.on_face and len(rises) == 1
+        lengths[last.origin] = float(term.length) if by_length else last.written(frame, origin)
+        yield kind, [rise.amount for rise in rises], lengths, words
 
 
 def _points(term: AbstractModification, frame: Frame, owner: str, error: float) -> dict[str, tuple[Any, str]]:
@@ -167,99 +234,55 @@ def read_modification(component: Component, frame: Frame) -> Iterator[AbstractMo
         raise component.refuse("", problem(error)) from None
 
 
-def _tip_relief(part: Component, frame: Frame) -> Iterator[AbstractModification]:
-    start = _roll_length(part, "tip_relief_datum_diameter", frame)
-    end = _roll_length(part, "tip_relief_evaluation_reference", frame, frame.tip)
-    if not start < min(end, frame.tip):
-        raise part.refuse(
-            "tip_relief_datum_diameter", "must be less than the tip diameter and where the depth is given"
-        )
-    yield TipRelief(*_relief(part, "tip_relief_depth", frame.tip - start, end - start))
-
-
-def _root_relief(part: Component, frame: Frame) -> Iterator[AbstractModification]:
-    end = _roll_length(part, "root_relief_datum_diameter", frame)
-    start = _roll_length(part, "root_relief_evaluation_reference", frame)
-    if not end > start:
-        raise part.refuse("root_relief_datum_diameter", "must be greater than the diameter where the depth is given")
-    if end > frame.start:  # else it ends below the active profile
-        yield RootRelief(*_relief(part, "root_relief_depth", end - frame.start, end - start))
-
-
-def _end_relief(part: Component, frame: Frame) -> Iterator[AbstractModification]:
-    face = part.type.removeprefix("end_relief_")
-    place = f"end_relief_evaluation_reference_{face}"
-    length, coordinate = part.needed(f"end_relief_length_{face}", "mm"), part.number(place, "mm")
-    # from where the depth is given to the start of the relief
-    given = length if coordinate is None else length - (0.5 * frame.width - frame.place(face, coordinate))
-    if not given > 0:
-        raise part.refuse(place, f"{coordinate:g} mm lies outside the relief")
-    yield EndRelief(*_relief(part, f"end_relief_depth_{face}", length, given), side=frame.side(face))
-
-
-def _relief(part: Component, name: str, length: float, given: float) -> tuple[Any, Any, AbstractCurve]:
-    """Amount, length and curve of a relief, from the depth at a given distance from its start."""
+def _relief(part: Component, frame: Frame) -> Iterator[AbstractModification]:
+    (rise,) = _RISES[part.type]
+    place, end = rise.given_place(part, frame), rise.end_place(frame)
+    origin = end - part.needed(rise.origin, "mm") if rise.on_face else rise.needed(part, rise.origin, frame)
+    if not origin < (min(place, end) if rise.end == "tip" else place):
+        if rise.on_face:
+            raise part.refuse(rise.place, f"{rise.written(frame, place):g} mm lies outside the relief")
+        raise part.refuse(rise.origin, _TOO_FAR[rise.end])
+    if not origin < end:  # it ends below the active profile
+        return
     if part.flag("specify_tangential_transition", False):
         raise part.refuse("specify_tangential_transition", "is not supported, must be false")
     shape = part.choice("shape_of_relief", None, ["linear", "parabolic", "circular"])
     power = 1 if shape == "linear" else 2
-    _check_arc(part, "shape_of_relief", shape, _amount(part, name), given)
-    curve = Linear() if power == 1 else Power(real(2.0))
-    return real(_at_end(part, name, length, given, power)), real(length), curve
+    _check_arc(part, "shape_of_relief", shape, _amount(part, rise.amount), place - origin)
+    amount = _at_end(part, rise.amount, end - origin, place - origin, power)
+    yield rise.relief(frame, amount, end - origin, Linear() if power == 1 else Power(real(2.0)))
 
 
-def _profile_crowning(part: Component, frame: Frame) -> Iterator[AbstractModification]:
-    shape, amounts, (at_root, at_tip), highest = _PROFILE_CROWNING
-    tip, root = _roll_length(part, at_tip, frame, frame.tip), _roll_length(part, at_root, frame)
-    top = _roll_length(part, highest, frame, 0.5 * (root + tip))
-    if not root < top < tip:
-        raise part.refuse(highest, "must lie between the diameters where the amounts are given")
-    lengths = top - frame.start, frame.tip - top
-    found = _crowning(part, shape, amounts, lengths, (top - root, tip - top))
-    if same(*lengths) and _equal(*found):
-        yield ProfileCrowning(real(found[0]))
+def _crowning(part: Component, frame: Frame) -> Iterator[AbstractModification]:
+    first, second = rises = _RISES[part.type]
+    low, high = (rise.given_place(part, frame) for rise in rises)
+    highest = second.read(part, second.origin, frame)
+    top = 0.5 * (high - low) if highest is None else highest
+    if not -low < top < high:
+        places = "coordinates" if first.on_face else "diameters"
+        raise part.refuse(second.origin, f"must lie between the {places} where the amounts are given")
+    shape, found = f"shape_of_{part.type}", []
+    for rise, place, down in ((first, low, top), (second, high, -top)):
+        word, length = part.choice(shape, "parabolic", ["parabolic", "circular"]), rise.end_place(frame) + down
+        _check_arc(part, shape, word, _amount(part, rise.amount), place + down)
+        found.append((_at_end(part, rise.amount, max(length, 0.0), place + down, 2), length))
+    (one, before), (other, behind) = found
+    if same(before, behind) and _equal(one, other):
+        yield (LeadCrowning if first.on_face else ProfileCrowning)(real(one))
         return
-    for relief, amount, length in zip((RootRelief, TipRelief), found, lengths):
+    for rise, (amount, length) in zip(rises, found):
         if length > 0:
-            yield relief(real(amount), real(length), Power(real(2.0)))
-
-
-def _helix_crowning(part: Component, frame: Frame) -> Iterator[AbstractModification]:
-    shape, amounts, places, name = _HELIX_CROWNING
-    half, given, highest = 0.5 * frame.width, [part.number(place, "mm") for place in places], part.number(name, "mm")
-    # from the middle towards each face
-    ends = [half if at is None else frame.place(face, at) for face, at in zip(FACES, given)]
-    top = 0.5 * (ends[0] - ends[1]) if highest is None else frame.place("datum_face", highest)
-    if not -ends[1] < top < ends[0]:
-        raise part.refuse(name, "must lie between the coordinates where the amounts are given")
-    lengths = half - top, half + top
-    found = _crowning(part, shape, amounts, lengths, (ends[0] - top, ends[1] + top))
-    if same(top, 0.0) and _equal(*found):
-        yield LeadCrowning(real(found[0]))
-        return
-    for face, amount, length in zip(FACES, found, lengths):
-        if length > 0:
-            yield EndRelief(real(amount), real(length), Power(real(2.0)), side=frame.side(face))
-
-
-def _crowning(
-    part: Component, shape: str, amounts: Iterable[str], lengths: Iterable[float], given: Iterable[float]
-) -> list[float]:
-    """Amounts [um] at both ends of the flank, from the amounts at given distances from the highest point."""
-    found = []
-    for name, length, there in zip(amounts, lengths, given):
-        _check_arc(part, shape, part.choice(shape, "parabolic", ["parabolic", "circular"]), _amount(part, name), there)
-        found.append(_at_end(part, name, max(length, 0.0), there, 2))
-    return found
+            yield rise.relief(frame, amount, length, Power(real(2.0)))
 
 
 def _profile_slope(part: Component, frame: Frame) -> Iterator[AbstractModification]:
-    start = _roll_length(part, "profile_evaluation_start", frame)
-    end = _roll_length(part, "profile_evaluation_end", frame, frame.tip)
-    given = _roll_length(part, "diameter_where_profile_slope_amount_is_specified", frame, end)
+    (rise,) = _RISES[part.type]
+    start, end = rise.needed(part, rise.origin, frame), rise.read(part, "profile_evaluation_end", frame)
+    given = rise.read(part, rise.place, frame)
+    given = given if given is not None else frame.tip if end is None else end
     if not given > start:
-        raise part.refuse("profile_evaluation_start", "must be less than the diameter where the amount is given")
-    yield ProfileSlope(real(_at_end(part, "profile_slope", frame.tip - frame.start, given - start, 1)))
+        raise part.refuse(rise.origin, "must be less than the diameter where the amount is given")
+    yield ProfileSlope(real(_at_end(part, rise.amount, frame.tip - frame.start, given - start, 1)))
 
 
 def _helix_slope(part: Component, frame: Frame) -> Iterator[AbstractModification]:
@@ -275,19 +298,6 @@ def _helix_slope(part: Component, frame: Frame) -> Iterator[AbstractModification
 
 def _topography(part: Component, frame: Frame) -> Iterator[AbstractModification]:
     yield flank_of(part, frame)
-
-
-def _roll_length(part: Component, name: str, frame: Frame, default: float | None = None) -> float:
-    """Roll length at a diameter."""
-    diameter = part.number(name, "mm")
-    if diameter is None:
-        if default is None:
-            raise part.refuse(name, "missing")
-        return default
-    found = float(frame.roll_length(diameter))
-    if not found >= 0:
-        raise part.refuse(name, f"{diameter:g} mm must be at least {2 * frame.base_radius:g} mm, the base diameter")
-    return found
 
 
 def _amount(part: Component, name: str) -> float:
@@ -316,12 +326,9 @@ def _equal(first: float, second: float) -> bool:
 
 
 _READERS: dict[str, Callable[[Component, Frame], Iterator[AbstractModification]]] = {
-    "tip_relief": _tip_relief,
-    "root_relief": _root_relief,
-    **{f"end_relief_{face}": _end_relief for face in FACES},
-    "profile_crowning": _profile_crowning,
+    **dict.fromkeys(("tip_relief", "root_relief", *(f"end_relief_{face}" for face in FACES)), _relief),
+    **dict.fromkeys(_CROWNINGS.values(), _crowning),
     "profile_slope": _profile_slope,
-    "helix_crowning": _helix_crowning,
     "helix_slope": _helix_slope,
     "topographical_modification": _topography,
 }
