@@ -27,8 +27,11 @@ import jax.numpy as jnp  # noqa: E402
 import numpy as np  # noqa: E402
 
 import jaxgear as jg  # noqa: E402
-from jaxgear import dynamics, manufacture  # noqa: E402
-from jaxgear.dynamics import dimensionless  # noqa: E402
+from jaxgear import (  # noqa: E402
+    dimensionless,  # noqa: E402
+    dynamics,
+    manufacture,
+)
 from jaxgear.io import load_design  # noqa: E402
 
 FILE = Path(__file__).parent / "dynamics_50_50.toml"

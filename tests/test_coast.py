@@ -3,8 +3,8 @@
 import pytest
 
 import jaxgear as jg
-from jaxgear.cli.convert import convert
 from jaxgear.io import DesignFileError, load_design
+from jaxgear.rexs.convert import convert
 from jaxgear.studies import DesignAnalysis
 from jaxgear.studies.study import AbstractStudy
 

@@ -9,7 +9,7 @@ import jaxgear as jg
 from jaxgear.compliance.edge import EdgeLaw, edge
 from jaxgear.compliance.hertz import contact_geometry
 from jaxgear.compliance.laws import AbstractPlainLaw, LinearLaw, LogarithmicLaw, PowerLaw
-from jaxgear.compliance.toothload import tooth_load
+from jaxgear.compliance.tooth import tooth_load
 from jaxgear.geometry import outline
 
 

@@ -8,7 +8,7 @@ import pytest
 
 import jaxgear as jg
 from jaxgear.compliance.hertz import ContactGeometry, ContactSide, contact_geometry
-from jaxgear.compliance.toothload import tooth_load
+from jaxgear.compliance.tooth import tooth_load
 from jaxgear.geometry import outline
 
 E, NU = 206e3, 0.3

@@ -9,7 +9,7 @@ import pytest
 from catalogue import LINE, gear_pair, kahraman_gear, prepare
 
 import jaxgear as jg
-from jaxgear.compliance.patch import cut_off
+from jaxgear.compliance.laws import cut_off
 from jaxgear.contact import solve_removed
 from jaxgear.contact.kinematics import contacts, corner_gap
 from jaxgear.contact.slide import nothing_removed

@@ -15,6 +15,7 @@ from jaxgear.geometry.cutter import full_rounding, rolling
 from jaxgear.io import DesignFileError
 from jaxgear.manufacture import drawn_gear
 from jaxgear.metrics.stress import critical_section
+from jaxgear.rexs import write_rexs
 
 
 def gear(teeth=25, shift=0.2, **changes):
@@ -277,4 +278,4 @@ def test_design_files_have_a_cutter(tmp_path):
 def test_exchange_files_refuse_a_cutter(tmp_path):
     pair = jg.GearPair(gear(root_radius=0.25), jg.Gear(40, 3.0, face_width=10.0))
     with pytest.raises(ValueError, match="write_rexs: pinion cutter_teeth = 30 must be left out"):
-        jg.io.write_rexs(tmp_path / "pair.xml", pair)
+        write_rexs(tmp_path / "pair.xml", pair)

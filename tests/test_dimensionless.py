@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 from catalogue import LINE, gear_pair, prepare, solve
 
-from jaxgear.dynamics import DeadZone
-from jaxgear.dynamics.dimensionless import (
+from jaxgear.dimensionless import (
     PUBLISHED,
     CycleRelief,
     DimensionlessForce,
@@ -30,6 +29,7 @@ from jaxgear.dynamics.dimensionless import (
     tip_relief,
     with_relief,
 )
+from jaxgear.dynamics import DeadZone
 from jaxgear.dynamics.integrate import cycle_of
 from jaxgear.geometry import path_of_contact
 from jaxgear.metrics import removed_at, secant_stiffness

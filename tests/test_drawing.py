@@ -13,7 +13,7 @@ import jaxgear as jg
 from jaxgear.compliance.assembly import with_edge
 from jaxgear.compliance.edge import _wedge_excess
 from jaxgear.compliance.hertz import contact_geometry
-from jaxgear.compliance.toothload import tooth_load
+from jaxgear.compliance.tooth import tooth_load
 from jaxgear.geometry import outline, pair_with_backlash
 from jaxgear.geometry.involute import half_tooth_angle
 from jaxgear.io import DesignFileError, load_design

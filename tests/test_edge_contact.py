@@ -6,7 +6,7 @@ import pytest
 from scipy.linalg import cholesky, solve_triangular
 from scipy.optimize import nnls
 
-from jaxgear.compliance.patch import cut_off
+from jaxgear.compliance.laws import cut_off
 
 PENALTY = 1e4
 CORNERS = (0.9, 0.6, 0.3, 0.0, -0.3, -1.0, -2.0, -3.0)

@@ -13,7 +13,7 @@ import jaxgear as jg
 from benchmarks import cases
 from jaxgear.compliance import plane_stress_share, write_table
 from jaxgear.compliance.finite_element.table_cache import cached
-from jaxgear.compliance.toothload import tooth_load
+from jaxgear.compliance.tooth import tooth_load
 from jaxgear.geometry import outline
 from jaxgear.io import DesignFileError, load_design
 

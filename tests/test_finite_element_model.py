@@ -13,7 +13,7 @@ from jaxgear.compliance.finite_element.sector import sector, shape_gradients, si
 from jaxgear.compliance.finite_element.sectors import Places, along_edge, responses
 from jaxgear.compliance.finite_element.shape import Shape, Tooth
 from jaxgear.compliance.hertz import contact_geometry
-from jaxgear.compliance.toothload import tooth_load
+from jaxgear.compliance.tooth import tooth_load
 from jaxgear.geometry import outline
 
 FULL = 0.25 / (1 - np.sin(np.deg2rad(20.0)))  # root radius that leaves no flat on the tip of the rack

@@ -13,7 +13,7 @@ import jaxgear as jg
 from jaxgear.compliance import AbstractBody, AbstractContact, ring
 from jaxgear.compliance.hertz import contact_geometry
 from jaxgear.compliance.plane import plane_modulus
-from jaxgear.compliance.toothload import tooth_load
+from jaxgear.compliance.tooth import tooth_load
 from jaxgear.geometry import outline
 from jaxgear.numerics import ContactProblem, solve_contact
 

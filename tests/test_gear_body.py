@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import jaxgear as jg
-from jaxgear.compliance import body, ring
-from jaxgear.compliance.toothload import tooth_load
+from jaxgear.compliance import published, ring
+from jaxgear.compliance.tooth import tooth_load
 from jaxgear.geometry import outline
 
 # theta_f, root over bore radius: L*, M*, P*, Q* of the published polynomial
@@ -41,7 +41,7 @@ NEIGHBOURS = {
 NU, M, V, N = 0.3, 0, 1, 2
 arc_compliance = jax.jit(ring.arc_compliance, static_argnums=4)
 relaxation = jax.jit(ring.relaxation)
-polynomial = jax.jit(body.coefficients)
+polynomial = jax.jit(published.coefficients)
 load_of = jax.jit(tooth_load)
 
 

@@ -12,10 +12,11 @@ from helical_pairs import pair_of
 
 import jaxgear as jg
 from jaxgear.contact import helical_slices
-from jaxgear.io import DesignFileError, load_design, read_rexs, write_design, write_rexs
-from jaxgear.io.rexs.values import frames
+from jaxgear.io import DesignFileError, load_design, write_design
 from jaxgear.io.write_design import write_starter
 from jaxgear.manufacture import span
+from jaxgear.rexs import read_rexs, write_rexs
+from jaxgear.rexs.frame import frames
 from jaxgear.studies.gear_data import _FACTORS as FACTORS
 from jaxgear.studies.gear_data import gears, mounting, rating_page
 

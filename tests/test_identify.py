@@ -11,8 +11,8 @@ from catalogue import FACE, LINE, SLIDING, gear_pair
 
 import jaxgear as jg
 from jaxgear.conditions import solve_case
-from jaxgear.io import DesignFileError, read_measurement
-from jaxgear.optimize import Measurement, identify
+from jaxgear.identification import Measurement, identify, read_measurement
+from jaxgear.io import DesignFileError
 from jaxgear.revolution import Teeth, TeethDeviations, solve_revolution
 from jaxgear.tolerance import ToleranceClass
 

@@ -11,10 +11,11 @@ from commands import FIXED, VARIABLES, assert_refused, call
 
 from jaxgear.conditions import solve_case
 from jaxgear.contact.kinematics import kinematics
-from jaxgear.io import DesignFile, load_design, read_rexs
+from jaxgear.identification import DesignIdentification, Identified
+from jaxgear.identification import study as identification
+from jaxgear.io import DesignFile, load_design
 from jaxgear.numerics import real
-from jaxgear.optimize import Identified
-from jaxgear.studies import DesignIdentification, identification
+from jaxgear.rexs import read_rexs
 from jaxgear.tolerance import ToleranceClass
 
 BASE = FIXED.replace("amount = 6.5", 'amount = "height"') + VARIABLES

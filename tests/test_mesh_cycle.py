@@ -19,7 +19,7 @@ from catalogue import (
 )
 
 import jaxgear as jg
-from jaxgear.compliance.toothload import tooth_load
+from jaxgear.compliance.tooth import tooth_load
 from jaxgear.geometry import outline
 
 CASES = pytest.mark.parametrize("name", [case.name for case in FINITE_ELEMENT_CASES])

@@ -6,8 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxgear.dynamics import DeadZone
-from jaxgear.dynamics.dimensionless import (
+from jaxgear.dimensionless import (
     CycleRelief,
     PolynomialClearance,
     combination_forcing,
@@ -26,6 +25,7 @@ from jaxgear.dynamics.dimensionless import (
     super_harmonic_resonance,
     with_relief,
 )
+from jaxgear.dynamics import DeadZone
 
 NATURAL = 0.9909887537  # omega_0 at F_m = 0.5
 SETTLING = 600  # cycles, as many as the slowest vibration needs: one program for all

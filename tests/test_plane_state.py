@@ -13,7 +13,7 @@ from catalogue import LINE, gear_pair
 import jaxgear as jg
 from jaxgear.compliance import Beam, ElasticRing, face_kernel, plane_stress_share
 from jaxgear.compliance.plane import _hyperbolic, plane_modulus, plane_poisson
-from jaxgear.compliance.toothload import tooth_load
+from jaxgear.compliance.tooth import tooth_load
 from jaxgear.geometry import outline
 
 REFERENCE = Path(__file__).parent.parent / "benchmarks" / "reference" / "face_width.csv"

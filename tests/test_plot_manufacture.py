@@ -121,20 +121,3 @@ def test_mesh_stiffness_over_the_phase(cycles):
     np.testing.assert_array_equal(tangent.get_ydata()[:32], cycle.tangent_stiffness)
     np.testing.assert_array_equal(secant.get_ydata()[:32], jg.secant_stiffness(cycle))
     assert tangent.axes.get_ylim()[0] == 0 and tangent.axes.get_ylabel() == "mesh stiffness [N/µm]"
-
-
-def test_meshing_diagram_shows_contact_on_the_line_of_action_and_on_the_tip_circles(cycles):
-    """Loaded pairs touch on the line between A and E, and beyond it on the tip circle of a gear."""
-    cycle = cycles["none"]
-    ax = plot.meshing_diagram(cycle)
-    line, points = ax.lines[-2].get_xydata(), ax.lines[-1].get_xydata()
-    contact, tip = cycle.kinematics.path_of_contact, 0.5 * 154.5709
-    along = (line[1] - line[0]) / np.linalg.norm(line[1] - line[0])
-    assert np.linalg.norm(line[0]) == pytest.approx(float(contact.pinion_pitch_roll_length))
-    position, off = points @ along, points @ [-along[1], along[0]]
-    inside = (position > float(contact.start)) & (position < float(contact.end)) & (abs(off) < 1e-9)
-    recess, approach = points[(position > 0) & ~inside], points[(position < 0) & ~inside]
-    assert len(recess) and len(approach) and inside.sum() > 30, "unmodified teeth touch beyond both ends"
-    np.testing.assert_allclose(np.hypot(recess[:, 0], recess[:, 1] + 75.0), tip, rtol=1e-12)
-    np.testing.assert_allclose(np.hypot(approach[:, 0], approach[:, 1] - 75.0), tip, rtol=1e-12)
-    assert (off[(position > 0) & ~inside] < 0).all() and (off[(position < 0) & ~inside] > 0).all()

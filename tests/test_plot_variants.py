@@ -92,7 +92,6 @@ def draw(table, scatter):
         "pareto of three": lambda ax=None: plot.pareto(some(table, PPTE, LOSS, PRESSURE), ax),
         "parallel": lambda ax=None: plot.parallel_coordinates(table, PPTE, ax),
         "fan": lambda ax=None: plot.fan(scatter, ax),
-        "histogram": lambda ax=None: plot.ppte_histogram(scatter, ax),
     }
 
 
@@ -100,7 +99,6 @@ UNITS = {
     "pareto": ("PPTE [µm]", "max flank pressure [MPa]"),
     "pareto of three": ("PPTE [µm]", "mesh loss factor H_V [-]"),
     "fan": ("mesh phase [base pitches]", "transmission error [µm]"),
-    "histogram": ("peak-to-peak transmission error [µm]", "share of the gears [%]"),
 }
 
 
@@ -292,19 +290,7 @@ def test_fan_bands_hold_the_quantiles(scatter):
     np.testing.assert_array_equal(ax.lines[1].get_ydata()[16:32], scatter.nominal_transmission_error)
 
 
-def test_histogram_marks_nominal_mean_and_quantile(scatter):
-    ax = plot.ppte_histogram(scatter)
-    marks = {line.get_label().rsplit(" ", 2)[0]: line.get_xdata()[0] for line in ax.lines}
-    expected = (scatter.nominal_ppte, scatter.mean, scatter.ppte_quantile95)
-    assert marks == dict(zip(("nominal", "mean", "95 % quantile"), map(float, expected)))
-    assert sum(bar.get_height() for bar in ax.patches) == pytest.approx(100.0)
-
-
 def test_failed_samples_show(scatter):
-    ax = plot.ppte_histogram(failing(scatter, 40))
-    assert ax.get_xlabel() == "peak-to-peak transmission error, 40 of 400 failed [µm]"
-    assert [line.get_label() for line in ax.lines] == [f"nominal {float(scatter.nominal_ppte):.2f} µm"]
-    assert sum(bar.get_height() for bar in ax.patches) == pytest.approx(90.0)
     plot.fan(failing(scatter, 40)).figure.draw_without_rendering()
 
 

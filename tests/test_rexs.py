@@ -12,13 +12,14 @@ from catalogue import LINE, gear_pair, prepare
 from rexs_schema import FOLDER, faults
 
 import jaxgear as jg
-from jaxgear.io import describe, read_rexs, write_rexs
-from jaxgear.io.rexs.gears import _SPANS as SPANS
-from jaxgear.io.rexs.values import frames
+from jaxgear.io import describe
 from jaxgear.io.table_keys import family
 from jaxgear.manufacture import span
 from jaxgear.microgeometry import AbstractCurve, AbstractModification, TabulatedFlank
 from jaxgear.numerics import number
+from jaxgear.rexs import read_rexs, write_rexs
+from jaxgear.rexs.frame import frames
+from jaxgear.rexs.thickness import SPANS
 
 PINION = jg.Gear(
     teeth=19,

@@ -10,7 +10,8 @@ import pytest
 from rexs_schema import data_model
 
 import jaxgear as jg
-from jaxgear.io import DesignFileError, read_rexs, write_rexs
+from jaxgear.io import DesignFileError
+from jaxgear.rexs import read_rexs, write_rexs
 
 PAIR = jg.GearPair(
     jg.Gear(teeth=19, module=3.0, face_width=20.0, bore_diameter=24.0, tooth_thickness_allowance=-33.3),

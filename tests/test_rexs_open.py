@@ -13,8 +13,9 @@ import pytest
 
 import jaxgear as jg
 from jaxgear.cli import main
-from jaxgear.io import DesignFileError, load_design, read_rexs, rexs_stages, write_rexs
-from jaxgear.io.rexs import container
+from jaxgear.io import DesignFileError, load_design
+from jaxgear.rexs import forms as container
+from jaxgear.rexs import read_rexs, rexs_stages, write_rexs
 
 PAIR = jg.GearPair(
     jg.Gear(teeth=19, module=3.0, face_width=20.0, bore_diameter=24.0, dedendum=1.31, tip_diameter=63.2),

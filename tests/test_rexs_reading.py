@@ -17,9 +17,10 @@ from catalogue import LINE, gear_pair, prepare
 
 import jaxgear as jg
 from jaxgear.cli import main
-from jaxgear.io import DesignFileError, load_design, read_rexs, write_rexs
-from jaxgear.io.rexs.values import frames
+from jaxgear.io import DesignFileError, load_design
 from jaxgear.manufacture import over_balls, span
+from jaxgear.rexs import read_rexs, write_rexs
+from jaxgear.rexs.frame import frames
 
 PAIR = jg.GearPair(
     jg.Gear(teeth=19, module=3.0, face_width=20.0, bore_diameter=24.0),

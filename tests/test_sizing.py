@@ -16,8 +16,6 @@ from jaxgear.sizing import (
     end_relief_amount,
     end_relief_length,
     equivalent_misalignment,
-    iso_crowning,
-    iso_end_relief,
     mesh_stiffness_relief,
     run_in_relief,
 )
@@ -148,14 +146,9 @@ def test_crowning_of_the_three_step_study():
 def test_crowning_follows_the_misalignment_within_its_range():
     """C = 0.5 (f_sh + 1.5 f_Hbeta) between 10 and 40 um, f_Hbeta between 10 and 25 um where the shafts are stiff."""
     assert float(equivalent_misalignment(10.0, 15.0)) == 30.0
-    assert float(iso_crowning(10.0, 15.0).amount) == 15.0
-    assert float(iso_crowning(12.0).amount) == 12.0
     assert [float(crowning_for_misalignment(f, limited=True)) for f in (4.0, 20.0, 50.0, 90.0)] == [10, 10, 25, 40]
     assert [float(crowning_for_misalignment(f)) for f in (4.0, 90.0)] == [2.0, 45.0]
     assert [float(crowning_for_tolerance(f, limited=True)) for f in (4.0, 20.0, 90.0)] == [10.0, 20.0, 25.0]
-    assert float(iso_crowning(2.0, limited=False).amount) == 2.0
-    assert float(iso_crowning(2.0, 4.0, limited=False).amount) == 3.5
-    assert float(iso_crowning(10.0, 0.0, limited=False).amount) == 7.5, "no deflection is not the rule for stiff shafts"
 
 
 def test_end_relief_by_hardness():
@@ -170,22 +163,19 @@ def test_end_relief_by_hardness():
 def test_end_relief_length_is_a_tenth_of_the_face_or_the_module():
     assert float(end_relief_length(PAIR)) == pytest.approx(1.8)
     assert float(end_relief_length(gear_pair((19, 48), face_width=50.0))) == pytest.approx(3.0)
-    relief = iso_end_relief(PAIR, 10.0, 15.0)
-    assert (float(relief.amount), float(relief.length)) == pytest.approx((15.0, 1.8))
-    assert relief.side == "both"
 
 
 def test_lead_rules_have_slopes_and_refuse_negative_tolerances():
-    by_tolerance, by_deflection = jax.grad(lambda f, s: iso_crowning(f, s).amount, (0, 1))(12.0, 15.0)
-    assert (float(by_tolerance), float(by_deflection)) == (0.75, 0.5)
-    assert float(jax.grad(lambda f: iso_crowning(f).amount)(40.0)) == 0.0, "beyond the range"
+    slopes = jax.grad(lambda f, s: crowning_for_misalignment(equivalent_misalignment(f, s)), (0, 1))(12.0, 15.0)
+    assert tuple(map(float, slopes)) == (0.75, 0.5)
+    assert float(jax.grad(lambda f: crowning_for_tolerance(f, limited=True))(40.0)) == 0.0, "beyond the range"
     amounts = jax.vmap(lambda f: end_relief_amount(f, 3.0))(jnp.asarray([2.0, 4.0]))
     np.testing.assert_allclose(amounts, [3.0, 4.5])
-    for rule in (crowning_for_tolerance, iso_crowning, end_relief_amount):
+    for rule in (crowning_for_tolerance, end_relief_amount):
         with pytest.raises(ValueError, match="helix_tolerance = -1 um"):
             rule(-1.0)
     with pytest.raises(ValueError, match="shaft_deflection = -2 um"):
-        iso_crowning(10.0, -2.0)
+        equivalent_misalignment(10.0, -2.0)
     with pytest.raises(ValueError, match="misalignment = -2 um"):
         crowning_for_misalignment(-2.0)
 

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 from catalogue import gear_pair
 
+from jaxgear.dimensionless import CycleRelief, PolynomialClearance, dimensionless_model
+from jaxgear.dimensionless.model import DimensionlessForce
 from jaxgear.dynamics import (
     DeadZone,
     Excitation,
@@ -16,8 +18,6 @@ from jaxgear.dynamics import (
     settle,
     speed_sweep,
 )
-from jaxgear.dynamics.dimensionless import CycleRelief, PolynomialClearance, dimensionless_model
-from jaxgear.dynamics.dimensionless.model import DimensionlessForce
 from jaxgear.dynamics.oscillator import at_rest, static_force
 
 DOUBLE, SINGLE, SHARE = 300.0, 200.0, 0.37

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import jaxgear as jg
-from jaxgear.compliance.toothload import tooth_load
+from jaxgear.compliance.tooth import tooth_load
 from jaxgear.geometry import outline
 from jaxgear.geometry.outline import involute_point, trochoid
 

@@ -84,7 +84,7 @@ def plain(mesh) -> Problem:
     import jax.numpy as jnp
 
     from jaxgear.compliance.hertz import contact_geometry
-    from jaxgear.compliance.toothload import tooth_load
+    from jaxgear.compliance.tooth import tooth_load
     from jaxgear.contact.contact_width import place_of
     from jaxgear.geometry import outline
 

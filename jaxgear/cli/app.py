@@ -8,12 +8,13 @@ import sys
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Any, Literal, NoReturn
+from typing import Annotated, Any, NoReturn
 
 import typer
 from typer.core import TyperGroup
 
 from ..io.first_look import check_keys
+from ..provided import provided
 from ..studies import registry
 from ..version import version as own_version
 from . import interrupt, streams
@@ -28,19 +29,19 @@ OK, NOT_CONVERGED, FAILED, INTERRUPTED = 0, 1, 2, 130
 
 
 class _Commands(TyperGroup):
-    """The commands, and the studies of other packages, which are looked for where a name is not known."""
+    """The commands, with those and the studies that entry points name, which are looked for where a name is unknown."""
 
     def list_commands(self, ctx: Any) -> list[str]:
         """Names for the help."""
-        return list(dict.fromkeys([*super().list_commands(ctx), *registry.provided()]))
+        return list(dict.fromkeys([*super().list_commands(ctx), *provided("commands"), *registry.provided()]))
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
         """The command of a name; None for an unknown one."""
         found = super().get_command(ctx, cmd_name)
         place = registry.own().get(cmd_name) if found else registry.provided().get(cmd_name)
-        if found is None and place is not None:
+        if found is None and (function := _study(place, cmd_name) if place else _named(cmd_name)):
             alone = typer.Typer(add_completion=False)
-            alone.command(cmd_name)(_study(place, cmd_name))
+            alone.command(cmd_name, help=_unbroken(function))(function)
             found = typer.main.get_command(alone)
         if found is not None and place is not None:
             found.help = registry.help_of(place)
@@ -56,6 +57,17 @@ app = typer.Typer(
     "130 interrupted (a sweep resumes). Begin with jaxgear new. Guides: examples/guides/index.md of the source; "
     "python -m jaxgear.io prints every table and key of a design file.",
 )
+
+
+def _named(name: str) -> Callable[..., Any] | None:
+    """The function of a command that an entry point names; None for an unknown one."""
+    entry = provided("commands").get(name)
+    return entry.load() if entry else None
+
+
+def _unbroken(function: object) -> str:
+    """Docstring of a command: the terminal breaks the lines of a paragraph, not the source."""
+    return "\n\n".join(" ".join(paragraph.split()) for paragraph in (function.__doc__ or "").split("\n\n"))
 
 
 def _show_version(wanted: bool) -> None:
@@ -96,7 +108,7 @@ def new(
     A file that is there is never replaced.
     """
     with interrupt.importing():
-        from .convert import new
+        from .new import new
     new(
         file,
         teeth,
@@ -111,7 +123,7 @@ def new(
     return OK
 
 
-def _run(
+def run_place(
     place: str,
     context: typer.Context,
     file: Path,
@@ -164,7 +176,7 @@ def _study(place: str, name: str) -> Callable[..., int]:
         no_cache: NoCache = False,
     ) -> int:
         shared = {"no_figures": no_figures, "reported": reported, "no_cache": no_cache}
-        return _run(place, context, file, output, **shared, quick=quick)
+        return run_place(place, context, file, output, **shared, quick=quick)
 
     return command
 
@@ -180,7 +192,7 @@ def analyze(
 ) -> int:
     """Analyze the unmodified pair and the modification of the design file."""
     shared = {"no_figures": no_figures, "reported": reported, "no_cache": no_cache}
-    return _run("jaxgear.studies.design_analysis:DesignAnalysis", context, file, output, **shared)
+    return run_place("jaxgear.studies.design_analysis:DesignAnalysis", context, file, output, **shared)
 
 
 @app.command()
@@ -203,43 +215,7 @@ def optimize(
     """
     shared = {"no_figures": no_figures, "reported": reported, "no_cache": no_cache}
     place = "jaxgear.studies.optimization:DesignOptimization"
-    return _run(place, context, file, output, **shared, method=method, quick=quick)
-
-
-@app.command()
-def identify(
-    context: typer.Context,
-    file: File,
-    measured: Annotated[
-        Path, typer.Argument(metavar="TE.csv", help="Measured transmission error.", show_default=False)
-    ],
-    output: Annotated[Path | None, output_option("identify")] = None,
-    noise: Annotated[
-        float | None, typer.Option(metavar="UM", help="Standard deviation of a reading in um; else that of repeats.")
-    ] = None,
-    torque_scale: Annotated[
-        float, typer.Option(metavar="SD", help="Standard deviation of true over measured torque, 0 for a right one.")
-    ] = 0.01,
-    offset: Annotated[
-        float, typer.Option(metavar="UM", help="Standard deviation of an offset of all readings in um, 0 for none.")
-    ] = 0.0,
-    pitch: Annotated[
-        bool, typer.Option("--pitch", help="Pitch deviations are unknown too, from readings of whole revolutions.")
-    ] = False,
-    quick: Quick = False,
-    no_figures: NoFigures = False,
-    reported: Reported = False,
-    no_cache: NoCache = False,
-) -> int:
-    """Find the values of the variables that gave a measured transmission error, and how well it tells them.
-
-    The file has the columns torque_Nm, te_um, and phase (base pitches) or angle_deg (of the pinion). An error that is
-    an angle names its shaft and unit: te_wheel_arcsec, te_pinion_deg.
-    """
-    shared = {"no_figures": no_figures, "reported": reported, "no_cache": no_cache}
-    unknown: dict[str, Any] = {"noise": noise, "torque_scale": torque_scale, "offset": offset, "pitch": pitch}
-    place = "jaxgear.studies.identification:DesignIdentification"
-    return _run(place, context, file, output, **shared, measured=measured, quick=quick, **unknown)
+    return run_place(place, context, file, output, **shared, method=method, quick=quick)
 
 
 for _name, _place in registry.own().items():
@@ -291,42 +267,8 @@ def sweep(
     return OK if fine else NOT_CONVERGED
 
 
-@app.command()
-def convert(
-    source: Annotated[Path, typer.Argument(metavar="IN", help="FILE.toml or FILE.rexs.", show_default=False)],
-    target: Annotated[
-        Path | None, typer.Argument(metavar="OUT", help="The other kind of file; none to list the stages of IN.")
-    ] = None,
-    stage: Annotated[int | None, typer.Option(metavar="ID", help="Cylindrical stage, where there are several.")] = None,
-    flank: Annotated[
-        Literal["left", "right"] | None, typer.Option(help="Flanks that touch, where both are modified differently.")
-    ] = None,
-    load_case: Annotated[int | None, typer.Option(metavar="ID", help="Load case, where there are several.")] = None,
-    torque: Annotated[
-        float | None, typer.Option(metavar="NM", help="Torque on the pinion in N m, in place of that of a REXS file.")
-    ] = None,
-    given: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--set", metavar="KEY=VALUE", help="A number in place of that of a REXS file, as pinion.tip_diameter=63.5."
-        ),
-    ] = None,
-) -> int:
-    """Convert a design file into a REXS file, or a stage of a REXS file into a design file.
-
-    REXS is the open exchange format for gearbox data. The gears with their modifications, torque and speed are
-    converted. A file that is there is never replaced. Without OUT the stages of a REXS file are listed, with why those
-    are not converted that are not.
-    """
-    with interrupt.importing():
-        from .convert import convert
-    convert(source, target, stage=stage, flank=flank, load_case=load_case, torque=torque, given=given or [])
-    return OK
-
-
-for _command in app.registered_commands:  # the terminal breaks the lines of a paragraph, not the source
-    _paragraphs = (_command.callback.__doc__ or "").split("\n\n")
-    _command.help = "\n\n".join(" ".join(paragraph.split()) for paragraph in _paragraphs)
+for _command in app.registered_commands:
+    _command.help = _unbroken(_command.callback)
 
 
 def main(arguments: Sequence[str] | None = None) -> NoReturn:

@@ -9,13 +9,12 @@ from jaxtyping import Array, Float, PyTree
 
 from ..geometry import GearPair, Outline
 from ..numerics import AbstractSpring, on_both
-from .body import AbstractBody, ElasticRing, Sainsot
+from .body import AbstractBody, ElasticRing
 from .edge import EdgeLaw, edge
-from .hertz import AbstractContact, ConstantHertz, ContactGeometry, DepthReferenced
+from .hertz import AbstractContact, ContactGeometry, DepthReferenced
 from .laws import AbstractLaw
 from .plane import Plane, PlaneState, check_plane_state, plane_stress_share, structure_planes
-from .tooth import AbstractTooth, Beam
-from .toothload import ToothLoad
+from .tooth import AbstractTooth, Beam, ToothLoad
 
 Structures = Float[Array, "gears pairs pairs positions"]
 Outside = Float[Array, "pairs positions"]
@@ -192,11 +191,3 @@ def default_compliance(plane: PlaneState = "auto", *, hub_windup: bool = True) -
         hub_windup: include the common torsion of the gear bodies between bore and root circle.
     """
     return Compliance(body=ElasticRing(hub_windup=hub_windup), plane=plane)
-
-
-def legacy_compliance() -> Compliance:
-    """Beam, Sainsot's uncoupled foundation, constant Hertz stiffness, plane stress: the usual published model.
-
-    It overstates the variation of the transmission error by 20 to 120 % against finite elements.
-    """
-    return Compliance(tooth=Beam(), body=Sainsot(), contact=ConstantHertz(), plane="stress", edge_softening=False)

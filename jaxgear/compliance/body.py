@@ -1,14 +1,4 @@
-"""Gear-body models: deflection of the root of a loaded tooth and of its neighbours.
-
-    delta = F cos^2 a / (E b) { L (u/S)^2 + M u/S + P (1 + Q tan^2 a) },   X = A/t^2 + B h^2 + C h/t + D/t + E h + F
-
-It is a fit to plane-stress rings with clamped bore and contains the ring's torsion. Stated validity: 1.4 <= h <= 7,
-0.01 <= t <= 0.12 with t = theta_f; pinions below about 25 teeth lie outside, where the polynomial extrapolates
-smoothly.
-
-References:
-    P. Sainsot, P. Velex, O. Duverger, J. Mech. Des. 126 (2004) 748-752, doi 10.1115/1.1758252, eq. (15) and Table 1.
-"""
+"""Gear-body models: deflection of the root of a loaded tooth and of its neighbours."""
 
 from abc import abstractmethod
 from functools import partial
@@ -22,26 +12,9 @@ from jaxtyping import Array, Float, PyTree
 from ..geometry.outline import Outline
 from ..numerics import Checked, count, on_both
 from . import ring
-from .plane import Plane, check_plane, plane_modulus, plane_poisson
+from .plane import Plane, plane_modulus, plane_poisson
 from .plate import axial_compliance
-from .toothload import ToothLoad
-
-_TABLE = np.array(
-    [
-        [-5.574e-5, -1.9986e-3, -2.3015e-4, 4.7702e-3, 0.0271, 6.8045],
-        [60.111e-5, 28.100e-3, -83.431e-4, -9.9256e-3, 0.1624, 0.9086],
-        [-50.952e-5, 185.50e-3, 0.0538e-4, 53.300e-3, 0.2895, 0.9236],
-        [-6.2042e-5, 9.0889e-3, -4.0964e-4, 7.8297e-3, -0.1472, 0.6904],
-    ]
-)
-
-
-def coefficients(half_angle: Float[Array, ""], thickness_ratio: Float[Array, ""]) -> Float[Array, "4"]:
-    """L*, M*, P*, Q* for a root half angle [rad] and a ratio of root to bore radius."""
-    t, h = half_angle, thickness_ratio
-    basis = jnp.stack([t**-2, h**2, h / t, 1 / t, h, jnp.ones_like(h)])
-    return jnp.asarray(_TABLE, basis.dtype) @ basis
-
+from .tooth import ToothLoad
 
 Matrices = Float[Array, "planes pairs pairs positions"]
 Arcs = Float[Array, "planes pairs 3 3"]
@@ -168,51 +141,3 @@ class ElasticRing(AbstractBody):
         if gear.helix_angle is None or not self.hub_windup:
             return super().slope(outline)
         return axial_compliance(gear).slope
-
-
-class Sainsot(AbstractBody):
-    """Sainsot's polynomial (legacy): no coupling, hub torsion inside each tooth, plane stress whatever is asked."""
-
-    def compliance(self, load: ToothLoad, step: int, plane: Plane) -> Float[Array, "pairs pairs positions"]:
-        outline, gear = load.outline, load.outline.gear
-        ratio = gear.root_circle_radius / gear.bore_radius
-        bending, mixed, shear, axial = coefficients(outline.root_half_angle, ratio)
-        arm = _arm_over_chord(load)
-        bracket = bending * arm**2 + mixed * arm + shear * (1 + axial * jnp.tan(load.angle) ** 2)
-        return _diagonal(1e3 * jnp.cos(load.angle) ** 2 / gear.material.elastic_modulus * bracket)
-
-    def hub(self, outline: Outline) -> Float[Array, ""]:
-        return jnp.zeros_like(outline.root_half_angle)
-
-
-class HalfPlane(AbstractBody):
-    """Half-plane foundation of Weber and Banaschek with Cornell's coefficients: no bore, no coupling.
-
-    References:
-        C. Weber, K. Banaschek, Formaenderung und Profilruecknahme, 1953; R. W. Cornell, J. Mech. Des. 103 (1981)
-        447-459.
-    """
-
-    def compliance(self, load: ToothLoad, step: int, plane: Plane) -> Float[Array, "pairs pairs positions"]:
-        check_plane(plane)
-        material = load.outline.gear.material
-        nu, arm = material.poisson_ratio, _arm_over_chord(load)
-        shear = 1.534 * (1 + 0.4167 * jnp.tan(load.angle) ** 2 / (1 + nu))
-        if plane == "strain":
-            bracket = (1 - nu**2) * (5.306 * arm**2 + 2 * (1 - nu - 2 * nu**2) / (1 - nu**2) * arm + shear)
-        else:
-            bracket = 5.306 * arm**2 + 2 * (1 - nu) * arm + shear
-        return _diagonal(1e3 * jnp.cos(load.angle) ** 2 / material.elastic_modulus * bracket)
-
-    def hub(self, outline: Outline) -> Float[Array, ""]:
-        return jnp.zeros_like(outline.root_half_angle)
-
-
-def _arm_over_chord(load: ToothLoad) -> Float[Array, "..."]:
-    """u_f / S_f: height of the crossing above the root circle over the root chord."""
-    outline = load.outline
-    return (load.height - outline.gear.root_circle_radius) / outline.root_chord
-
-
-def _diagonal(values: Float[Array, "pairs positions"]) -> Float[Array, "pairs pairs positions"]:
-    return jnp.eye(values.shape[0], dtype=values.dtype)[:, :, None] * values[None]

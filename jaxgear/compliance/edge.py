@@ -33,9 +33,8 @@ from jaxtyping import Array, Float
 
 from ..numerics import AbstractSpring, log, on_both
 from .hertz import ContactGeometry, ContactSide
-from .laws import AbstractLaw, Cut
-from .patch import Patch, cut_off
-from .toothload import ToothLoad
+from .laws import AbstractLaw, Cut, Patch, cut_off
+from .tooth import ToothLoad
 
 Field = Float[Array, "pairs #slices positions"]
 Real = Float[Array, "..."]

@@ -18,9 +18,9 @@ from jaxtyping import Array, Float
 
 from ..geometry import reduced_radius
 from ..numerics import Checked, Given, result
-from .laws import AbstractLaw, LinearLaw, LogarithmicLaw, PowerLaw
+from .laws import AbstractLaw, LogarithmicLaw
 from .plane import Plane, plane_modulus, plane_poisson
-from .toothload import ToothLoad
+from .tooth import ToothLoad
 
 Field = Float[Array, "pairs 1 positions"]
 Real = Float[Array, "..."]
@@ -106,19 +106,6 @@ class AbstractContact(Checked):
         """The law for a given local geometry."""
 
 
-class ConstantHertz(AbstractContact):
-    """Load-independent approach 4 (1 - nu^2) / (pi E) per unit line load, for both gears together (legacy).
-
-    Three to four times too stiff at usual loads. Plane strain in any case, as in the literature.
-
-    References:
-        D. C. H. Yang, Z. S. Sun, J. Mech. Trans. Autom. 107 (1985) 529-535.
-    """
-
-    def prepare(self, geometry: ContactGeometry) -> AbstractLaw:
-        return LinearLaw(2e3 / jnp.pi * (1 / geometry.pinion.strain_modulus + 1 / geometry.wheel.strain_modulus))
-
-
 class DepthReferenced(AbstractContact):
     """Approach of the surfaces against the tooth centrelines (default).
 
@@ -138,75 +125,16 @@ class DepthReferenced(AbstractContact):
             return [jnp.log(reach) - side.poisson * side.depth / reach for side, reach in zip(geometry.sides, reaches)]
 
         span = jnp.minimum(geometry.pinion.depth, geometry.wheel.depth) ** 2
-        return _logarithmic(geometry, brackets, span, terms=_DEPTH_TERMS)
+        return logarithmic_law(geometry, brackets, span, terms=_DEPTH_TERMS)
 
 
-class Weber(AbstractContact):
-    """`DepthReferenced` in its limit h >> a: delta = sum_k 2 q / (pi E'_k) [ ln(2 h_k / a) - nu'_k / 2 ].
-
-    References:
-        C. Weber, K. Banaschek 1953.
-    """
-
-    def prepare(self, geometry: ContactGeometry) -> AbstractLaw:
-        return _logarithmic(geometry, lambda _: [jnp.log(2 * side.depth) - side.poisson / 2 for side in geometry.sides])
-
-
-class CenterDistance(AbstractContact):
-    """Centre-to-centre approach of two cylinders: bracket ln(4 R_k / a) - 1/2 per body. Double counts the tooth bulk.
-
-    References:
-        K. L. Johnson, Contact Mechanics, 1985, eq. (4.57).
-    """
-
-    def prepare(self, geometry: ContactGeometry) -> AbstractLaw:
-        return _logarithmic(geometry, lambda _: [jnp.log(4 * side.radius) - 0.5 for side in geometry.sides])
-
-
-class Kovalskii(AbstractContact):
-    """Roark's two cylinders: bracket ln(2 R_k / a) + 0.407 per body. Double counts the tooth bulk.
-
-    References:
-        Roark's Formulas for Stress and Strain, contact of two cylinders.
-    """
-
-    def prepare(self, geometry: ContactGeometry) -> AbstractLaw:
-        return _logarithmic(geometry, lambda _: [jnp.log(2 * side.radius) + 0.407 for side in geometry.sides])
-
-
-class Palmgren(AbstractContact):
-    """Roller-bearing power law delta = 3.84e-5 F^0.9 / L^0.8 [mm, N, mm], steel on steel; centre to centre.
-
-    The length of the roller is the face width; slices use the law of the full width.
-    """
-
-    def prepare(self, geometry: ContactGeometry) -> AbstractLaw:
-        factor = 1e3 * 3.84e-5 * geometry.face_width**0.1
-        return PowerLaw(factor, jnp.full_like(factor, 0.9))
-
-
-class NonlinearPower(AbstractContact):
-    """Power law k = E^0.9 b^0.8 F^0.1 / 1.275 (secant stiffness), a smooth substitute close to the depth law.
-
-    E is the harmonic mean of the two moduli; slices use the law of the full width.
-
-    References:
-        R. W. Cornell, J. Mech. Des. 103 (1981) 447-459; D. C. H. Yang, J. Y. Lin, J. Mech. Trans. Autom. 109 (1987).
-    """
-
-    def prepare(self, geometry: ContactGeometry) -> AbstractLaw:
-        young = 2 / (1 / geometry.pinion.young + 1 / geometry.wheel.young)
-        factor = 1e3 * 1.275 * geometry.face_width**0.1 / young**0.9
-        return PowerLaw(factor, jnp.full_like(factor, 0.9))
-
-
-def _logarithmic(
+def logarithmic_law(
     geometry: ContactGeometry,
     brackets: Callable[[Array], Sequence[Array]],
     span: Real | float = 1.0,
     terms: int = 1,
 ) -> LogarithmicLaw:
-    """sum_k 2 q / (pi E'_k) [ bracket_k(a^2) - ln a ] with a = sqrt(width_factor q).
+    """The law sum_k 2 q / (pi E'_k) [ bracket_k(a^2) - ln a ] with a = sqrt(width_factor q).
 
     The brackets become a polynomial through Chebyshev nodes in 0 <= a^2 <= span: the contact solution evaluates the
     law far more often than anything else.

@@ -42,8 +42,8 @@ def arc_compliance(
         K times the plane modulus, dimensionless, shape (k, 3, 3), rows responding and columns loaded modes
         (moment, shear, normal).
     """
-    ring = ring_compliance(thickness_ratio, poisson, harmonics)
-    modes = arc_modes(half_angle, harmonics)
+    ring = _ring_compliance(thickness_ratio, poisson, harmonics)
+    modes = _arc_modes(half_angle, harmonics)
     order = jnp.arange(1, harmonics + 1, dtype=modes.dtype)
     pairs = jnp.einsum("ani,nij,bnj->abn", modes[:, 1:], ring, modes[:, 1:])
     angle = order[None] * spacing[:, None]
@@ -54,7 +54,7 @@ def arc_compliance(
     same = np.array([[1.0, 1.0, 0.0], [1.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
     cross = np.array([[0.0, 0.0, -1.0], [0.0, 0.0, -1.0], [1.0, 1.0, 0.0]])
     matrix = jnp.pi * (even * jnp.asarray(same, even.dtype)[None] + odd * jnp.asarray(cross, odd.dtype)[None])
-    breathing = 2 * jnp.pi * modes[2, 0, 0] ** 2 * uniform_compliance(thickness_ratio, poisson)
+    breathing = 2 * jnp.pi * modes[2, 0, 0] ** 2 * _uniform_compliance(thickness_ratio, poisson)
     return matrix + breathing * jnp.asarray(np.diag([0.0, 0.0, 1.0]), breathing.dtype)[None]
 
 
@@ -76,13 +76,13 @@ def relaxation(half_angle: Scalar) -> Float[Array, "3 3"]:
     return 0.5 * jnp.diag(jnp.stack([bending, direct, direct]))
 
 
-def uniform_compliance(thickness_ratio: Scalar, poisson: Scalar) -> Scalar:
+def _uniform_compliance(thickness_ratio: Scalar, poisson: Scalar) -> Scalar:
     """Radial displacement of the root circle per uniform radial stress (harmonic 0)."""
     inner = thickness_ratio**-2
     return (1 - poisson**2) * (1 - inner) / ((1 + poisson) + (1 - poisson) * inner)
 
 
-def arc_modes(half_angle: Scalar, harmonics: int) -> Float[Array, "3 n 2"]:
+def _arc_modes(half_angle: Scalar, harmonics: int) -> Float[Array, "3 n 2"]:
     """Fourier coefficients of the three load modes for unit resultants, n = 0 ... harmonics.
 
     The traction per arc length is the chord stress times cos(theta), turned into polar components. The second component
@@ -119,7 +119,7 @@ def arc_modes(half_angle: Scalar, harmonics: int) -> Float[Array, "3 n 2"]:
     return jnp.stack(rows) * jnp.asarray(scale, t.dtype)[None, :, None]
 
 
-def ring_compliance(thickness_ratio: Scalar, poisson: Scalar, harmonics: int) -> Float[Array, "n 2 2"]:
+def _ring_compliance(thickness_ratio: Scalar, poisson: Scalar, harmonics: int) -> Float[Array, "n 2 2"]:
     """Displacements (u_r, u_theta) of the root circle per stresses (sigma_r, tau) of harmonic n = 1 ... harmonics.
 
     Four Michell terms per harmonic; the decaying ones are scaled to their value at the bore so that no power overflows.

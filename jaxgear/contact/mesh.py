@@ -13,7 +13,7 @@ from jaxtyping import Array, Float
 from ..compliance import AbstractCompliance, default_compliance
 from ..compliance.hertz import ContactGeometry, contact_geometry
 from ..compliance.plane import Plane, contact_plane
-from ..compliance.toothload import ToothLoad, tooth_load
+from ..compliance.tooth import ToothLoad, tooth_load
 from ..geometry import GearPair, Margins, Outline, PairGeometry, PathOfContact, explicit, pair_geometry
 from ..microgeometry import Flank
 from ..numerics import AbstractSpring, Given, SliceCoupling, changed, on_both, over_slices, program

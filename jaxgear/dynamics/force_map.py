@@ -78,7 +78,7 @@ class ForceMap(WithStatus, AbstractMeshForce):
     def force(self, place: Rows, dte: Scalar) -> Scalar:
         levels = len(place.force) // 2
         drive, closed = closing(place.start, dte)
-        level = level_of(closed, self.reach, levels)
+        level = _level_of(closed, self.reach, levels)
         below = jnp.floor(jnp.clip(level, 0.0, levels - 2.0))
         node = below.astype(jnp.int32) + jnp.where(drive, 0, levels).astype(jnp.int32)
         share = level - below
@@ -90,7 +90,7 @@ class ForceMap(WithStatus, AbstractMeshForce):
         return jnp.where(drive, found, -found)
 
 
-def level_of(closed: Scalar, reach: Scalar, levels: int) -> Scalar:
+def _level_of(closed: Scalar, reach: Scalar, levels: int) -> Scalar:
     """Number of the level at a DTE beyond touching [um], a fraction between two: the inverse of `dte_levels`."""
     share, bend = closed / reach, (1 - _FIRST_STEP) / _FIRST_STEP**2
     inside = 2 * share / (_FIRST_STEP * (1 + jnp.sqrt(1 + 4 * bend * jnp.clip(share, 0.0, 1.0))))

@@ -110,7 +110,7 @@ def rolling(
     alpha = of.deg2rad(pressure_angle)
     tangent, cosine = of.tan(alpha), of.cos(alpha)
     wanted = _involute(tangent) + 2 * tangent * (generating_shift + cutter_shift) / (teeth + cutter_teeth)
-    working = tangent_of(wanted)
+    working = _tangent_of(wanted)
     secant = of.sqrt(1 + working**2)
     reference, base = 0.5 * module * cutter_teeth, 0.5 * module * cutter_teeth * cosine
     gear_base = 0.5 * module * teeth * cosine
@@ -180,7 +180,7 @@ def cutter_contact(
     return reach, (cutter_radius * theta + offset) / pitch_radius
 
 
-def tangent_of(involute: Number) -> Number:
+def _tangent_of(involute: Number) -> Number:
     """tan(alpha) of inv(alpha) [rad], of NumPy's or JAX's numbers; derivatives of all orders are those of the root."""
     of = _library(involute)
     wanted = of.maximum(involute, _LEAST_INVOLUTE)

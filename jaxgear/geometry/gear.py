@@ -433,7 +433,7 @@ def shape_faults(gear: Gear) -> tuple[str, ...]:
     height, land, rim, chamfer, left, room, tip, form, base, root, bore = (float(number) for number in shape)
     name = "addendum" if gear.tip_diameter is None else "tip_diameter"
     faults = []
-    in_radians = None if gear.tip_diameter is None or height > 0 and land > 0 else tip_in_radians(gear)
+    in_radians = None if gear.tip_diameter is None or height > 0 and land > 0 else _tip_in_radians(gear)
     if in_radians is not None:
         faults.append(in_radians)
     elif not height > 0:
@@ -465,7 +465,7 @@ def shape_faults(gear: Gear) -> tuple[str, ...]:
     return tuple(faults)
 
 
-def tip_in_radians(gear: Gear) -> str | None:
+def _tip_in_radians(gear: Gear) -> str | None:
     """The fault of a helix angle in radians, told by the tip diameter that it makes; None where it is not that."""
     meant = degrees_meant(gear)
     if meant is None:

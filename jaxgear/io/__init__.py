@@ -1,4 +1,4 @@
-"""Files: design files (TOML) in, results (JSON, CSV) out, gear pairs exchanged with other programs (REXS).
+"""Files: design files (TOML) in, results (JSON, CSV) out.
 
 The public names are listed in `__init__.pyi` and imported when they are asked for: the command line looks at the keys
 of a file (`first_look`) before it imports JAX.

@@ -10,7 +10,6 @@ from .folder import result_folder as result_folder
 from .folder import writing as writing
 from .layout_table import LayoutRequest as LayoutRequest
 from .layout_table import layout_request as layout_request
-from .measured_te import read_measurement as read_measurement
 from .named_quantities import quantities_of_tables as quantities_of_tables
 from .optimize_table import OptimizeRequest as OptimizeRequest
 from .optimize_table import optimize_request as optimize_request
@@ -24,11 +23,6 @@ from .results import write_summary as write_summary
 from .results import write_traces as write_traces
 from .results import write_wheel_drawing as write_wheel_drawing
 from .results import write_wheel_points as write_wheel_points
-from .rexs import RexsPair as RexsPair
-from .rexs import RexsStage as RexsStage
-from .rexs import read_rexs as read_rexs
-from .rexs import rexs_stages as rexs_stages
-from .rexs import write_rexs as write_rexs
 from .rows import read_variants as read_variants
 from .sweep_table import SweepRequest as SweepRequest
 from .sweep_table import sweep_request as sweep_request

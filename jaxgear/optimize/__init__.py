@@ -12,12 +12,8 @@ from .free_form import project as project
 from .goal import Constraint as Constraint
 from .gradient_search import LBFGS as LBFGS
 from .gradient_search import Adam as Adam
-from .identify import Identified as Identified
-from .identify import identify as identify
-from .identify import period_of as period_of
 from .iteration import iterate_from_low_pressure as iterate_from_low_pressure
 from .iteration import iterate_transmission_error as iterate_transmission_error
-from .measurement import Measurement as Measurement
 from .minimize import METHODS as METHODS
 from .minimize import minimize as minimize
 from .pareto_search import Pareto as Pareto

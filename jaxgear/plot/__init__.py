@@ -38,7 +38,6 @@ from .layout import shaft_deflection as shaft_deflection
 from .layout import tolerance_line_load as tolerance_line_load
 from .mesh_cycle import load_sharing as load_sharing
 from .mesh_cycle import mesh_stiffness as mesh_stiffness
-from .mesh_cycle import meshing_diagram as meshing_diagram
 from .mesh_cycle import pressure as pressure
 from .mesh_cycle import transmission_error as transmission_error
 from .revolution import order_spectrum as order_spectrum
@@ -47,7 +46,6 @@ from .variants import face_load_over_torque as face_load_over_torque
 from .variants import fan as fan
 from .variants import harris_map as harris_map
 from .variants import ppte_distribution as ppte_distribution
-from .variants import ppte_histogram as ppte_histogram
 from .variants import ppte_over_overlap as ppte_over_overlap
 from .variants import ppte_over_torque as ppte_over_torque
 from .variants import response_surface as response_surface

@@ -9,6 +9,7 @@ from matplotlib.patches import Rectangle
 
 from ..layout import CASES, ToleranceCases
 from ..shafts import Gearbox, Shaft, elastic_line
+from ..shafts.gearbox import axes_of
 from ..sweeps.columns import printed_unit
 from .figure import (
     FONT,
@@ -242,7 +243,7 @@ def shaft_deflection(gearbox: Gearbox, ax: Panels | None = None) -> np.ndarray:
     count = len(gearbox.shafts)
     with report_axes(ax, rows=count, width=WIDTH, height=_HEIGHT * count) as panels:
         panels = np.atleast_1d(panels)
-        for panel, shaft, start in zip(panels, gearbox.shafts, _starts(gearbox), strict=True):
+        for panel, shaft, start in zip(panels, gearbox.shafts, axes_of(gearbox)[:, 2], strict=True):
             panel.grid(False)
             _draw_parts(panel, shaft, start)
             _draw_line(panel, gearbox, shaft, start)
@@ -250,20 +251,6 @@ def shaft_deflection(gearbox: Gearbox, ax: Panels | None = None) -> np.ndarray:
             legend_above(panel)
         panels[-1].set_xlabel("axial coordinate [mm]")
     return panels
-
-
-def _starts(gearbox: Gearbox) -> list[float]:
-    """Left ends of the shafts on a common axial coordinate [mm], from the middles of meshing faces."""
-    starts = {0: 0.0}
-    meshes = [[gearbox.place(name) for name in (mesh.pinion, mesh.wheel)] for mesh in gearbox.meshes]
-    while len(starts) < len(gearbox.shafts):
-        for (one, first), (other, second) in meshes:
-            offset = float(first.position) - float(second.position)
-            if one in starts and other not in starts:
-                starts[other] = starts[one] + offset
-            elif other in starts and one not in starts:
-                starts[one] = starts[other] - offset
-    return [starts[index] for index in range(len(gearbox.shafts))]
 
 
 def _draw_parts(ax: Axes, shaft: Shaft, start: float) -> None:

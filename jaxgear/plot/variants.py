@@ -178,37 +178,6 @@ def fan(scatter: Scatter, ax: Axes | None = None) -> Axes:
     return ax
 
 
-def ppte_histogram(scatter: Scatter, ax: Axes | None = None) -> Axes:
-    """Distribution of PPTE [um] over the samples, with the nominal design, the mean and the 95 % quantile.
-
-    Failed samples have no PPTE; the ordinate counts them in, and the label of the abscissa says how many there are.
-
-    Args:
-        scatter: result of `monte_carlo`.
-        ax: Axes to draw into; None for a new figure.
-    """
-    ppte = np.asarray(scatter.ppte)
-    fine = ppte[np.isfinite(ppte)]
-    marks = {
-        "nominal": scatter.nominal_ppte,
-        "mean": scatter.mean,
-        "95 % quantile": scatter.ppte_quantile95,
-    }
-    bins = int(np.clip(2 * np.cbrt(fine.size), 10, 80))
-    with report_axes(ax) as ax:
-        weights = np.full(fine.size, 100 / ppte.size)
-        ax.hist(fine, bins=bins, weights=weights, color=_BANDS[1], edgecolor="white", linewidth=0.3)
-        for index, (name, value) in enumerate(marks.items()):
-            if np.isfinite(value):
-                style = line_style((1, 0, 2)[index])
-                ax.axvline(float(value), label=f"{name} {float(value):.2f} µm", **style)
-        failed = f", {scatter.failed} of {ppte.size} failed" if scatter.failed else ""
-        ax.set_xlim(left=0)
-        ax.set(xlabel=f"peak-to-peak transmission error{failed} [µm]", ylabel="share of the gears [%]")
-        legend_above(ax)
-    return ax
-
-
 def ppte_distribution(
     samples: Mapping[str, ArrayLike],
     ax: Axes | None = None,

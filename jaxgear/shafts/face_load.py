@@ -163,7 +163,7 @@ def annex_e(
 def _removed(pair: GearPair, pinion: AbstractModification, wheel: AbstractModification, stations: int) -> Slices:
     """Material removed by both flanks [um]; a program of its own, so that one for the load serves all kinds."""
     y = even_coordinates(pair.face_width, stations)
-    amount = sum(item(flank) for item, flank in zip((pinion, wheel), pitch_lines(pair, y)))
+    amount = sum(item(flank) for item, flank in zip((pinion, wheel), _pitch_lines(pair, y)))
     return jnp.broadcast_to(amount, y.shape)
 
 
@@ -204,7 +204,7 @@ def _annex_e(
     )
 
 
-def pitch_lines(pair: GearPair, y: Slices) -> tuple[Flank, Flank]:
+def _pitch_lines(pair: GearPair, y: Slices) -> tuple[Flank, Flank]:
     """The flanks of pinion and wheel along their pitch lines, y from the middle of the common face."""
     path = path_of_contact(pair)
     starts = path.pinion_roll_length(path.start), path.wheel_roll_length(path.end)

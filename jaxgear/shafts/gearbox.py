@@ -32,7 +32,7 @@ class Path(NamedTuple):
     inwards: tuple[tuple[int, int], ...]
 
 
-def torque_path(shafts: Sequence[str], meshes: Sequence[tuple[int, int]], outlet: int) -> Path:
+def _torque_path(shafts: Sequence[str], meshes: Sequence[tuple[int, int]], outlet: int) -> Path:
     """The path through shafts that meshes (shaft of the pinion, shaft of the wheel) join.
 
     Raises:
@@ -157,7 +157,7 @@ class Gearbox(Checked):
     @property
     def path(self) -> Path:
         """The way of the torque."""
-        return torque_path(
+        return _torque_path(
             [shaft.name for shaft in self.shafts],
             [(self.place(mesh.pinion)[0], self.place(mesh.wheel)[0]) for mesh in self.meshes],
             self._outlet(),

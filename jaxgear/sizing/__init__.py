@@ -7,8 +7,6 @@ from .lead import crowning_for_tolerance as crowning_for_tolerance
 from .lead import end_relief_amount as end_relief_amount
 from .lead import end_relief_length as end_relief_length
 from .lead import equivalent_misalignment as equivalent_misalignment
-from .lead import iso_crowning as iso_crowning
-from .lead import iso_end_relief as iso_end_relief
 from .relief import dynamic_relief as dynamic_relief
 from .relief import effective_relief as effective_relief
 from .relief import iso_relief as iso_relief

@@ -12,7 +12,6 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..geometry import GearPair
-from ..microgeometry import EndRelief, LeadCrowning
 from ..numerics import Given, check, real
 
 Scalar = Float[Array, ""]
@@ -62,25 +61,6 @@ def crowning_for_tolerance(helix_tolerance: Given, *, limited: bool = False) -> 
     return jnp.clip(amount, *_STIFF_CROWNING) if limited else amount
 
 
-def iso_crowning(
-    helix_tolerance: Given, shaft_deflection: Given | None = None, *, limited: bool = True
-) -> LeadCrowning:
-    """Crowning of ISO 6336-1 Annex B, ready to use.
-
-    It counts over the gear's own face: on a gear that is wider than its mate the common face has (common / own)^2 of
-    it. There give it to the narrower gear, or widen its amount.
-
-    Args:
-        helix_tolerance: f_Hbeta, helix slope tolerance [um].
-        shaft_deflection: f_sh [um over the face width]; None where shafts are stiff or their deflection is compensated.
-        limited: whether to keep to the ranges of the annex.
-    """
-    if shaft_deflection is None:
-        return LeadCrowning(crowning_for_tolerance(helix_tolerance, limited=limited))
-    misalignment = equivalent_misalignment(helix_tolerance, shaft_deflection)
-    return LeadCrowning(crowning_for_misalignment(misalignment, limited=limited))
-
-
 def end_relief_amount(
     helix_tolerance: Given, shaft_deflection: Given = 0.0, *, kind: Kind = "surface_hardened"
 ) -> Scalar:
@@ -109,14 +89,3 @@ def end_relief_amount(
 def end_relief_length(pair: GearPair) -> Scalar:
     """Width of each end relief [mm], the smaller of 0.1 b and 1.0 m_n (ISO 6336-1 Annex B)."""
     return jnp.minimum(0.1 * pair.face_width, pair.pinion.module)
-
-
-def iso_end_relief(
-    pair: GearPair, helix_tolerance: Given, shaft_deflection: Given = 0.0, *, kind: Kind = "surface_hardened"
-) -> EndRelief:
-    """Linear end relief on both ends: `end_relief_amount` over `end_relief_length`.
-
-    For a gear that ends with the common face. On one that is wider than its mate the relief lies at its own ends,
-    outside of the contact as far as the gear overhangs (a finding of `findings_of`): give it to the narrower gear.
-    """
-    return EndRelief(end_relief_amount(helix_tolerance, shaft_deflection, kind=kind), end_relief_length(pair))

@@ -13,8 +13,6 @@ from .evaluation import Evaluation as Evaluation
 from .evaluation import evaluate as evaluate
 from .export import ExportResult as ExportResult
 from .export import ExportStudy as ExportStudy
-from .identification import DesignIdentification as DesignIdentification
-from .identification import IdentificationResult as IdentificationResult
 from .layout import LayoutStudy as LayoutStudy
 from .layout_result import LayoutResult as LayoutResult
 from .optimization import DesignOptimization as DesignOptimization

@@ -12,9 +12,9 @@ import importlib
 import importlib.util
 from typing import Any
 
+from ..provided import provided as provided_by
 from . import __all__ as public
 
-_GROUP = "jaxgear.studies"
 _ENDING = "Study"
 
 
@@ -27,9 +27,7 @@ def own() -> dict[str, str]:
 
 def provided() -> dict[str, str]:
     """Place of every study that installed packages provide, likewise."""
-    from importlib import metadata  # which takes longer to import than the names of this package
-
-    return {entry.name: f"{entry.module}:{entry.attr}" for entry in metadata.entry_points(group=_GROUP)}
+    return {name: entry.value for name, entry in provided_by("studies").items()}
 
 
 def help_of(place: str) -> str:

@@ -24,7 +24,7 @@ from scipy.integrate import quad
 
 import jaxgear as jg
 from jaxgear.compliance.hertz import contact_geometry
-from jaxgear.compliance.toothload import tooth_load
+from jaxgear.compliance.tooth import tooth_load
 from jaxgear.geometry import outline
 
 pytestmark = pytest.mark.verify

@@ -22,7 +22,7 @@ from ..plane import (
     plane_stress_share,
     structure_planes,
 )
-from ..toothload import ToothLoad
+from ..tooth import ToothLoad
 from .build import build, hub
 from .compliance_table import GearTable, Scale, different, scaled, shape_of
 from .files import read_table

@@ -1,0 +1,127 @@
+"""The modification of a mesh as one displacement over the mesh cycle."""
+
+import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from ..geometry import GearPair, path_of_contact
+from ..microgeometry import AbstractCurve, Linear, TipRelief
+from ..numerics import Checked, Given, check, concrete, number, real
+
+Scalar = Float[Array, ""]
+
+_SAME_RATIO = 1e-3  # by which two contact ratios may differ and still be those of one pair
+
+
+class CycleRelief(Checked):
+    """Tip relief of both gears as what it takes off the DTE of the whole mesh, C(phase).
+
+    One pair at the distance t from the begin of its path of contact has lost `amount * curve(delta)`, with delta = s /
+    length from 0 where the relief starts to 1 at the tip, on either end of the path. Of two pairs in contact, equally
+    stiff, the mesh feels the mean: k (q - C_1) + k (q - C_2) = 2 k (q - (C_1 + C_2) / 2). That is what a single C(t)
+    can represent, and it holds while both pairs touch; the mesh force of a contact analysis shares the load as it is.
+
+    Attributes:
+        amount: C_max at the tip [half clearances].
+        length: lambda, on the line of action [base pitches], at most half of the contact ratio; contact ratio - 1
+            reaches from the tip to the highest point of single contact.
+        contact_ratio: from 1 to 2.
+        curve: C / C_max over delta: `Power`, `Quadratic`, `Polynomial`, `Sinusoidal` or any other.
+        begin: mesh position where the second pair comes into contact [base pitches].
+    """
+
+    amount: Scalar = number("half clearances")
+    length: Scalar = number("base pitches", low=0.0, open_low=True)
+    contact_ratio: Scalar = number("", low=1.0, high=2.0)
+    curve: AbstractCurve = eqx.field(default_factory=Linear)
+    begin: Scalar = number("base pitches", default=0.0)
+
+    def __call__(self, phase: Scalar) -> Scalar:
+        """C [half clearances] at a mesh position [base pitches]."""
+        turned = phase - self.begin
+        first = turned - jnp.floor(turned)
+        two = first < self.contact_ratio - 1
+        one_alone, behind = self.of_pair(first), self.of_pair(first + 1)
+        return jnp.where(two, 0.5 * (one_alone + behind), one_alone)
+
+    def of_pair(self, travel: Scalar) -> Scalar:
+        """Modification of one pair [half clearances], `travel` base pitches after the begin of its contact."""
+        length = self.length
+        from_begin, to_end = (length - travel) / length, (travel - self.contact_ratio + length) / length
+        lost = jnp.zeros_like(from_begin)
+        for depth in (from_begin, to_end):
+            inside = (depth > 0) & (depth <= 1 + 1e-9)
+            lost = lost + jnp.where(inside, self.curve(jnp.where(inside, depth, 0.5)), 0.0)
+        return self.amount * lost
+
+    def check_together(self) -> None:
+        ratio = concrete(self.contact_ratio)
+        if ratio is not None:
+            check("CycleRelief", "length", self.length, "base pitches", high=0.5 * ratio)
+
+    @property
+    def ends(self) -> Float[Array, " two"]:
+        """Mesh positions where the number of pairs changes [base pitches], in [0, 1)."""
+        ends = jnp.stack([self.begin, self.begin + self.contact_ratio - 1])
+        return ends - jnp.floor(ends)
+
+
+def cycle_relief(relief: TipRelief, pair: GearPair, half_clearance: Given) -> CycleRelief:
+    """Modification over the mesh cycle by the same tip relief on both gears.
+
+    Args:
+        relief: tip relief of either gear.
+        pair: pinion and wheel, with a contact ratio from 1 to 2.
+        half_clearance: b, half of the backlash on the line of action [um].
+
+    Raises:
+        ValueError: for a half clearance that is not positive, or a relief without length or longer than half of the
+            path of contact.
+    """
+    check("cycle_relief", "half_clearance", half_clearance, "um", low=0.0, open_low=True)
+    path = path_of_contact(pair)
+    # at mesh position 0 a pair touches at the pitch point, and one later it is a base pitch further on
+    begin = path.start / path.base_pitch
+    return CycleRelief(
+        relief.amount / real(half_clearance),
+        relief.length / path.base_pitch,
+        path.contact_ratio,
+        relief.curve,
+        begin - jnp.floor(begin),
+    )
+
+
+def tip_relief(relief: CycleRelief, pair: GearPair, half_clearance: Given) -> TipRelief:
+    """The tip relief of either gear that takes a modification of the mesh cycle off its flanks.
+
+    The last step of a dynamic profile modification: the distance on the line of action is one of roll length, which
+    over the base radius is a roll angle (`manufacture.profile_trace` tabulates the flank over either).
+
+    Args:
+        relief: C, as `dynamic_profile_modification` finds it.
+        pair: pinion and wheel that it was found for.
+        half_clearance: b, half of the backlash on the line of action [um].
+
+    Raises:
+        ValueError: for a half clearance that is not positive, or another contact ratio than that of the pair.
+    """
+    check("tip_relief", "half_clearance", half_clearance, "um", low=0.0, open_low=True)
+    path = path_of_contact(pair)
+    ratio, own = concrete(relief.contact_ratio), concrete(path.contact_ratio)
+    if ratio is not None and own is not None and abs(ratio - own) > _SAME_RATIO:
+        raise ValueError(f"tip_relief: contact_ratio = {ratio:.4g} of the relief must be that of the pair, {own:.4g}")
+    return TipRelief(relief.amount * real(half_clearance), relief.length * path.base_pitch, relief.curve)
+
+
+def largest_relief(load: Given, torque_fluctuation: Given, displacement: Given, least_stiffness: Given) -> Scalar:
+    """C_max = (F_m + F_ah + F_aT) / K_min [half clearances], as the study of dynamic modification prints it.
+
+    It adds amplitudes of different kinds: F_m and F_aT are forces over b k_mean, but F_ah is a displacement over b,
+    whose force is F_ah Omega^2. In newtons over a stiffness in N/um the rule is sound: `sizing.dynamic_relief`.
+
+    Args:
+        load, torque_fluctuation, displacement: F_m, F_aT, F_ah.
+        least_stiffness: smallest stiffness over its mean, 1 + sum B_j cos(...) at its least.
+    """
+    check("largest_relief", "least_stiffness", least_stiffness, "", low=0.0, open_low=True)
+    return (real(load) + real(displacement) + real(torque_fluctuation)) / real(least_stiffness)

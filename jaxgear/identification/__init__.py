@@ -1,0 +1,9 @@
+"""Identification: the values of variables that gave a measured transmission error, and how well it tells them.
+
+The public names are listed in `__init__.pyi` and imported when they are asked for. The command `identify` is an entry
+point of the package.
+"""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

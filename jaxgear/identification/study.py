@@ -1,0 +1,412 @@
+"""The study of a measured transmission error: which values of the variables of a design file gave it."""
+
+import csv
+import tempfile
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, ClassVar, Self
+
+import equinox as eqx
+import numpy as np
+
+from ..contact import Mesh, Resolution
+from ..io import DesignFile, DesignFileError, write_design, write_flanks
+from ..io.design_file import FileDesign
+from ..io.errors import naming, problem, refused
+from ..io.tolerance_table import quality_classes
+from ..microgeometry import AbstractModification, EndRelief, LeadCrowning, LeadSlope
+from ..numerics import check, real
+from ..provided import provided
+from ..report import Table
+from ..studies.checkpoints import Checkpoints
+from ..studies.evaluation import coarse
+from ..studies.progress import Stages
+from ..studies.study import AbstractStudy, AbstractStudyResult
+from ..studies.summary_data import flanks_data
+from ..tolerance import ToleranceClass
+from .estimate import Identified, identify, period_of
+from .measured_te import read_measurement
+from .measurement import Measurement
+
+_OF_LIMIT = 3.0  # limit deviation over standard deviation: nearly all gears of a class keep its limits
+_OF_RANGE = 4.0  # range of a variable over standard deviation
+# refusals of data: how they begin, of which column they are, and what helps
+_HELP = (
+    ("offset", "te_um", ": --offset gives its standard deviation"),
+    ("phase", "phase", ": give the column revolution, or phases that go on"),
+    ("", "te_um", "; --noise gives it"),
+)
+_OVER_FACE = LeadCrowning, LeadSlope, EndRelief  # the helix tolerance is that of these, the profile's of all others
+_RELATED = 0.7  # least correlation that is said
+_NOISE = "95 % of\nnoise [um]"
+_MOST_PANELS = 5
+_SHOWN = 4.0  # base pitches of a whole revolution
+_PANEL = 45.0  # height [mm]
+
+
+class _Flanks(eqx.Module):
+    """The design of the file from its variables, whatever else is unknown."""
+
+    design: FileDesign
+
+    def __call__(self, parameters: Mapping[str, Any]) -> tuple[AbstractModification, AbstractModification]:
+        return self.design({name: parameters[name] for name in self.design.names})
+
+
+@dataclass(frozen=True)
+class DesignIdentification(AbstractStudy["IdentificationResult"]):
+    """Find the values of the variables of a design file that gave a measured transmission error.
+
+    Attributes:
+        measured: file of the data.
+        measurement: the data.
+        prior: mean and standard deviation of every variable.
+        torque_scale, offset: standard deviations of these unknowns; 0 where they are known.
+        single_pitch: those of the single pitch deviations of pinion and wheel; None for equal teeth.
+    """
+
+    name: ClassVar = "identify"
+
+    measured: Path
+    measurement: Measurement
+    prior: Mapping[str, tuple[float, float]]
+    torque_scale: float
+    offset: float
+    single_pitch: tuple[float, float] | None
+
+    @classmethod
+    def of(
+        cls,
+        design: DesignFile,
+        *,
+        measured: str | Path = "",
+        quick: bool = False,
+        noise: float | None = None,
+        torque_scale: float = 0.01,
+        offset: float = 0.0,
+        pitch: bool = False,
+    ) -> Self:
+        """Identification of the variables of a design file from a measurement, see `AbstractStudy.of`.
+
+        Args:
+            design: the design file.
+            measured: file of the measurement, see `read_measurement`.
+            quick: True for a preview on few positions.
+            noise: standard deviation of a reading [um]; None estimates it from repeated readings.
+            torque_scale: standard deviation of the ratio of true to measured torque; 0 for an exact torque.
+            offset: standard deviation of an offset added to every reading [um]; 0 for no offset.
+            pitch: True if single pitch deviations of all teeth are unknowns, within f_pT of the class of their gear.
+        """
+        for name, given in (("torque-scale", torque_scale), ("offset", offset)):
+            check("identify", name, given, "um" if name == "offset" else "", low=0.0)
+        if noise is not None:
+            check("identify", "noise", noise, "um", low=0.0, open_low=True)
+        if not design.bounds:
+            raise DesignFileError("variables", "missing; identify looks for the values of variables", design.path)
+        for free in design.open_case:
+            says = f'"{free.name}" must be a number here, identify varies modifications alone'
+            raise DesignFileError(free.key, says, design.path)
+        for name in ("torque_scale", "offset"):
+            if name in design.bounds:
+                raise DesignFileError(
+                    f"variables.{name}", "is an unknown of identify, choose another name", design.path
+                )
+        with naming(design.path):
+            prior, pitches = _prior(design), _single_pitch(design) if pitch else None
+        data = read_measurement(measured, design.pair(), noise=noise)
+        study = cls(design, quick, Path(measured), data, prior, torque_scale, offset, pitches)
+        sizes = study._sizes()
+        try:
+            data.noise_on(sizes, period_of(data, design.pair(), pitches, offset or None))
+        except ValueError as error:
+            says = str(error).removeprefix("identify: ")
+            key, help_ = next((key, help_) for begin, key, help_ in _HELP if says.startswith(begin))
+            raise DesignFileError(key, says.removeprefix(f"{key} ") + help_, study.measured) from None
+        return study
+
+    def _further(self) -> list[float]:
+        """Torques of the file that were not measured [N m]."""
+        return sorted({*self.design.torque_range, self.design.torque} - {*np.asarray(self.measurement.torque).tolist()})
+
+    def _sizes(self) -> Resolution:
+        size = self.design.resolution(max([float(np.max(np.asarray(self.measurement.torque))), *self._further()]))
+        return coarse(size) if self.quick else size
+
+    def omits(self) -> str:
+        """Nothing: [tolerance] gives priors."""
+        return ""
+
+    def work_out(self, checkpoints: Checkpoints, stages: Stages) -> "IdentificationResult":
+        """The identified variables; keeps no checkpoints."""
+        stages.begin("preparing the mesh")
+        mesh = self.design.mesh(self._sizes())
+        stages.begin("searching the variables")
+        try:
+            found = identify(
+                _Flanks(self.design.design),
+                self.prior,
+                self.measurement,
+                mesh=mesh,
+                torque_scale=self.torque_scale or None,
+                offset=self.offset or None,
+                single_pitch=self.single_pitch,
+                candidates=self._further(),
+            )
+        except ValueError as error:
+            raise DesignFileError("variables", str(error).removeprefix("identify: "), self.design.path) from None
+        return IdentificationResult(self.design, self.measured, mesh, self.prior, found)
+
+
+def _single_pitch(design: DesignFile) -> tuple[float, float]:
+    """Standard deviations of the single pitch deviations of both gears: a third of f_pT of ISO 1328-1."""
+    classes = quality_classes(design)
+    if classes is None:
+        raise DesignFileError("tolerance", "missing; --pitch takes the limit f_pT of the class of each gear")
+    first, second = (float(of.single_pitch) / _OF_LIMIT for of in classes)
+    return first, second
+
+
+def _prior(design: DesignFile) -> dict[str, tuple[float, float]]:
+    """Mean and standard deviation of every variable.
+
+    The mean is its value, without one the middle of its range. The standard deviation is a quarter of the range; with
+    the table [tolerance], that of an amount in um is a third of F_alphaT, over the face F_betaT, of ISO 1328-1.
+    """
+    limits: dict[str, float] = {}
+    if "tolerance" in design.tables:
+        quality_classes(design)  # which names the gear that no class is made for
+        tolerated = design.tables["tolerance"].quality_class
+        numbers = tolerated if isinstance(tolerated, list | tuple) else (tolerated, tolerated)
+        for gear, number, parts in zip(design.pair().gears, numbers, (design.design.pinion, design.design.wheel)):
+            of = refused("tolerance", ToleranceClass.of, gear, number)
+            for part in parts:
+                limit = float(of.helix_total if part.make in _OVER_FACE else of.profile_total)
+                amounts = [free.name for free in part.free() if free.number.unit == "um"]
+                limits |= {name: max(limit, limits.get(name, 0.0)) for name in amounts}
+    prior = {}
+    for name, (low, high) in design.bounds.items():
+        spread = limits[name] / _OF_LIMIT if name in limits else (high - low) / _OF_RANGE
+        prior[name] = design.values.get(name, 0.5 * (low + high)), spread
+    return prior
+
+
+@dataclass(frozen=True)
+class IdentificationResult(AbstractStudyResult):
+    """Result of the identification of variables from a measured transmission error.
+
+    Attributes:
+        design: the design file.
+        measured: file of the measurement.
+        mesh: mesh of the model that was fitted.
+        prior: prior mean and standard deviation of every variable.
+        found: identified values with their uncertainty.
+    """
+
+    assumptions: ClassVar = ("Noise, priors and the error of the model are normally distributed.",)
+
+    design: DesignFile
+    measured: Path
+    mesh: Mesh
+    prior: Mapping[str, tuple[float, float]]
+    found: Identified
+
+    def _flanks(self) -> tuple[AbstractModification, AbstractModification]:
+        """Both modifications; raises ValueError where the estimates make none, such as a negative relief."""
+        return _Flanks(self.design.design)(self.found.parameters)
+
+    def _rows(self) -> Iterator[tuple[str, str, float, float, float, float]]:
+        found, units = self.found, {**self.design.units, "torque_scale": "", "offset": "um"}
+        numbers = (np.asarray(each).tolist() for each in (found.estimate, found.deviation, *found.prior))
+        for name, *values in zip(found.names[: found.own], *numbers):
+            yield name, units[name], *values
+
+    def tables(self) -> list[Table]:
+        """One row per unknown, and the mesh orders of what the fit leaves."""
+        header = "unknown", "unit", "estimate", "standard\ndeviation", "prior\nmean", "prior\ndeviation"
+        result = Table(header, title=f"{self.design.title}: identified from {self.measured.name}")
+        for name, unit, *values in self._rows():
+            result.add_row(name, unit, *(f"{value:.4g}" for value in values))
+        amplitudes = self.found.residual_orders
+        columns = "torque\n[N m]", *(f"order {order}\n[um]" for order in range(1, amplitudes.shape[1] + 1)), _NOISE
+        left = Table(columns, title="measured minus fitted: amplitudes of the mesh orders")
+        for torque, *row in zip(self.found.torques, *amplitudes.T, self.found.noise_orders):
+            left.add_row(f"{torque:g}", *(f"{value:.3f}" for value in row))
+        return [result, *self._pitches(), left]
+
+    def _pitches(self) -> Iterator[Table]:
+        """The pitch deviations of every gear in few numbers."""
+        if self.found.single_pitch:
+            header = (
+                "gear",
+                "largest single\npitch deviation",
+                "total cumulative\npitch deviation",
+                "standard deviation\nof a single one",
+            )
+            result = Table(header, title="pitch deviations [um]")
+            for gear, (single, deviation) in self.found.single_pitch.items():
+                one = np.asarray(single)
+                numbers = np.max(np.abs(one)), np.ptp(np.cumsum(one)), np.sqrt(np.mean(np.square(deviation)))
+                result.add_row(gear, *(f"{number:.3g}" for number in numbers))
+            yield result
+
+    def verdict(self) -> Iterator[str]:
+        """Quality of the fit, related unknowns, what the data cannot tell, and the torque that would tell most."""
+        found = self.found
+        yield (
+            f"chi-square per degree of freedom {float(found.chi_square):.2f} by noise alone, "
+            f"error of the model {float(found.model_error):.2g} um"
+        )
+        correlation = np.asarray(found.correlation)
+        for first, second in zip(*np.triu_indices(found.own, 1)):
+            if abs(correlation[first, second]) >= _RELATED:
+                names = f"{found.names[first]} and {found.names[second]}"
+                yield f"correlation of {names}: {correlation[first, second]:.2f}"
+        yield from found.not_told()
+        if found.best_candidate is not None:
+            yield f"further torque that would tell most of what is told least: {found.best_candidate:g} N m"
+
+    def findings(self) -> list[str]:
+        """Estimates outside the range of their variable."""
+        return [
+            f"{name}: {value:.4g} {unit} is outside its range of {low:g} to {high:g} {unit}".replace("  ", " ")
+            for name, unit, value, *_ in self._rows()
+            for low, high in [self.design.bounds.get(name, (-np.inf, np.inf))]
+            if not low <= value <= high
+        ]
+
+    def failures(self) -> Iterator[str]:
+        """A line where the search did not end, or its estimates make no flank."""
+        if not bool(self.found.converged):
+            yield "NOT CONVERGED: do not use the estimates. Narrow the ranges or raise resolution.pairs."
+        try:
+            self._flanks()
+        except ValueError as error:
+            yield f"NO DESIGN FILE: the estimates make no flank: {problem(error)}"
+
+    def summary(self) -> dict[str, Any]:
+        """Unknowns, correlations, what the data cannot tell, and the fit."""
+        found = self.found
+        keys = "unit", "estimate", "standard_deviation", "prior_mean", "prior_standard_deviation"
+        try:
+            flanks = flanks_data(*self._flanks())
+        except ValueError:
+            flanks = {}
+        return {
+            "measured_file": self.measured.name,
+            "torques_Nm": found.torques,
+            "unknowns": {name: dict(zip(keys, row)) for name, *row in self._rows()},
+            "correlation": np.asarray(found.correlation)[: found.own, : found.own],
+            "singular_values": np.asarray(found.singular_values),
+            "cannot_tell": found.not_told(),
+            "further_torque_Nm": found.best_candidate,
+            "chi_square": float(found.chi_square),
+            "model_error_um": float(found.model_error),
+            **{
+                f"{gear}_single_pitch_um": {"estimate": single, "standard_deviation": deviation}
+                for gear, (single, deviation) in found.single_pitch.items()
+            },
+            "residual_orders_um": found.residual_orders,
+            "noise_orders_um": found.noise_orders,
+            "converged": bool(found.converged),
+            **flanks,
+        }
+
+    def details(self) -> Iterator[str]:
+        """Reasons why the pair is not written in a format that has no place for it."""
+        if not list(self.failures()):
+            with tempfile.TemporaryDirectory() as folder:
+                yield from self._exchanged(Path(folder))
+
+    def _exchanged(self, folder: Path) -> Iterator[str]:
+        """Write a file of every provided format; yields the reasons why one is not written."""
+        for name, entry in provided("formats").items():
+            path, write = folder / f"identified.{name}", entry.load()
+            try:
+                write(path, materials=self.design.materials, **self._pair())
+            except ValueError as error:
+                yield f"{path.name} is not written: {str(error).removeprefix(f'{write.__name__}: ')}"
+
+    def _pair(self) -> dict[str, Any]:
+        """The pair with the estimates, as both writers take it."""
+        design, (pinion, wheel) = self.design, self._flanks()
+        case = {name: getattr(design, name) for name in ("torque", "speed", "quality_classes", "title")}
+        return {"pair": design.pair(), "pinion": pinion, "wheel": wheel, **case}
+
+    def _designs(self) -> dict[str, tuple[AbstractModification, AbstractModification]]:
+        """Flanks of the prior means and of the estimates."""
+        before = {name: real(mean) for name, (mean, _) in self.prior.items()}
+        return {"prior": self.design.design(before), "identified": self._flanks()}
+
+    def write(self, folder: Path) -> None:
+        """The unknowns as CSV, and the pair with the estimates as design file, flanks and files of other formats."""
+        with (folder / "identified.csv").open("w", newline="", encoding="utf-8") as file:
+            writer = csv.writer(file)
+            names = "name", "unit", "estimate", "standard_deviation", "prior_mean", "prior_standard_deviation"
+            writer.writerow(names)
+            writer.writerows([name, unit, *(f"{value:.7g}" for value in row)] for name, unit, *row in self._rows())
+        for gear, columns in self.found.single_pitch.items():
+            with (folder / f"pitch_{gear}.csv").open("w", newline="", encoding="utf-8") as file:
+                writer = csv.writer(file)
+                writer.writerow(["tooth", "single_pitch_um", "standard_deviation_um"])
+                rows = zip(*(np.asarray(column).tolist() for column in columns))
+                writer.writerows([tooth, *(f"{value:.4f}" for value in row)] for tooth, row in enumerate(rows))
+        if list(self.failures()):
+            return
+        write_design(folder / "identified.toml", **self._pair())
+        write_flanks(folder / "flanks.csv", self.mesh, self._designs())
+        list(self._exchanged(folder))
+
+    def figures(self) -> dict[str, Any]:
+        """Measured and fitted transmission error, and the flanks of prior and estimates within their tolerances."""
+        from .. import plot
+
+        axes: dict[str, Any] = {"identified": self._fit()}
+        if not list(self.failures()):
+            of: dict[str, Any] = {"tolerance": quality_classes(self.design)}
+            axes["k_chart"] = plot.k_chart(self.mesh, self._designs(), **of)
+            if self.mesh.resolution.slices > 1:
+                axes["lead_chart"] = plot.lead_chart(self.mesh, self._designs(), **of)
+        if self.found.single_pitch:
+            axes["pitch"] = self._teeth()
+        for drawn in axes.values():
+            plot.emphasize(np.ravel(drawn)[0].figure, "identified")
+        return axes
+
+    def _teeth(self) -> np.ndarray:
+        """Single pitch deviations with their standard deviations, a panel per gear."""
+        from .. import plot
+
+        pitches, style = self.found.single_pitch, {**plot.figure.line_style(0), "linestyle": "none"}
+        with plot.figure.report_axes(None, rows=len(pitches), height=_PANEL * len(pitches)) as panels:
+            for panel, (gear, given) in zip(np.ravel(panels), pitches.items()):
+                single, deviation = map(np.asarray, given)
+                tooth = np.arange(len(single))
+                panel.bar(tooth, single, color="0.8")
+                panel.errorbar(tooth, single, deviation, markersize=3, marker="o", **style)
+                panel.set(ylabel=f"{gear}: single pitch\ndeviation [µm]")
+            panel.set_xlabel("tooth")
+        return panels
+
+    def _fit(self) -> np.ndarray:
+        """Measured and fitted transmission error over the phase, a panel per torque."""
+        from .. import plot
+
+        found, torques, first = self.found, self.found.torques, np.min(np.asarray(self.found.phase))
+        shown = torques[np.unique(np.linspace(0, len(torques) - 1, _MOST_PANELS).round().astype(int))]
+        size: dict[str, Any] = {"rows": len(shown), "height": _PANEL * len(shown)}
+        with plot.figure.report_axes(None, **size) as panels:
+            for number, (panel, torque) in enumerate(zip(np.ravel(panels), shown)):
+                at = np.flatnonzero((np.asarray(found.torque) == torque) & (np.asarray(found.phase) < first + _SHOWN))
+                at = at[np.argsort(np.asarray(found.phase)[at])]
+                phase, measured, fitted, noise = (
+                    np.asarray(each)[at] for each in (found.phase, found.measured, found.fitted, found.noise)
+                )
+                style = {**plot.figure.line_style(0), "linestyle": "none"}
+                panel.errorbar(phase, measured, noise, marker="o", markersize=3, label="measured", **style)
+                panel.plot(phase, fitted, label="fitted", **{**plot.figure.line_style(1), "linestyle": "-"})
+                panel.set(ylabel=f"TE at {torque:g} N m [µm]")
+                if number == 0:
+                    plot.figure.legend_above(panel)
+            panel.set_xlabel("phase [base pitches]")
+        return panels
