@@ -61,13 +61,13 @@ class LoadSpectrum(Checked):
         self.friction, self.duration = optional_real(friction), optional_real(duration)
         self._check_different()
         shares = real(np.ones(self.torques.shape, self.torques.dtype)) if weights is None else real(weights)
-        check("LoadSpectrum", "weights", shares, "", low=0.0)
+        check("LoadSpectrum: weights", shares, "", low=0.0)
         if shares.ndim != 1:
             raise ValueError(f"LoadSpectrum: weights must be a list of {len(self.torques)}, one per torque")
         shares = self._as_many("weights", shares)
         known = concrete(shares)
         total = jnp.sum(shares) if known is None else known.sum()
-        check("LoadSpectrum", "sum of the weights", total, "", low=0.0, open_low=True)
+        check("LoadSpectrum: sum of the weights", total, "", low=0.0, open_low=True)
         self.weights = shares / total if known is None else real(known / total)
 
     def _as_many(self, name: str, values: Array) -> Array:
@@ -99,10 +99,10 @@ class LoadSpectrum(Checked):
             ValueError: as the class does, and for hours that are all zero.
         """
         spent = real(hours)
-        check("LoadSpectrum", "hours", spent, "h", low=0.0)
+        check("LoadSpectrum: hours", spent, "h", low=0.0)
         if spent.ndim != 1:
             raise ValueError("LoadSpectrum: hours must be a list, one entry per torque")
-        check("LoadSpectrum", "sum of the hours", jnp.sum(spent), "h", low=0.0, open_low=True)
+        check("LoadSpectrum: sum of the hours", jnp.sum(spent), "h", low=0.0, open_low=True)
         return LoadSpectrum(torques, spent, speeds, friction, jnp.sum(spent))
 
     @property
@@ -110,11 +110,8 @@ class LoadSpectrum(Checked):
         """Hours at every torque [h]; None without a duration."""
         return None if self.duration is None else self.weights * self.duration
 
-    def turns(self, owner: str) -> Float[Array, " torques"]:
+    def turns(self) -> Float[Array, " torques"]:
         """Revolutions of the pinion at every torque; their shares, the weights, without a duration.
-
-        Args:
-            owner: name of the caller, for messages.
 
         Raises:
             ValueError: for a duration without speeds.
@@ -122,7 +119,7 @@ class LoadSpectrum(Checked):
         if self.duration is None:
             return self.weights
         if self.speeds is None:
-            raise ValueError(f"{owner}: a load spectrum with a duration needs speeds, for the number of revolutions")
+            raise ValueError("a load spectrum with a duration needs speeds, for the number of revolutions")
         return _MINUTES * self.weights * self.duration * self.speeds
 
     @staticmethod
@@ -237,7 +234,6 @@ class Cases(Checked):
 
 
 def conditions(
-    owner: str,
     mesh: Mesh,
     torque: Loads,
     *,
@@ -248,7 +244,6 @@ def conditions(
     """Conditions of a torque or a load spectrum, with manufactured gears where there is a tolerance.
 
     Args:
-        owner: the function that is asked, for messages.
         mesh: prepared mesh; its number of pairs and its floating-point type count, nothing else.
         torque: on the pinion [N m], an `OperatingPoint`, or a `LoadSpectrum`.
         tolerance: of manufactured gears; None for nominal ones.
@@ -262,12 +257,12 @@ def conditions(
     if isinstance(torque, LoadSpectrum):
         load = torque
     else:
-        load = LoadSpectrum.of(operating_point_of(owner, torque, real(0.0).dtype))
+        load = LoadSpectrum.of(operating_point_of("torque", torque, real(0.0).dtype))
     if tolerance is None:
         if samples is not None:
-            raise ValueError(f"{owner}: samples = {samples!r} has no effect without a tolerance")
+            raise ValueError(f"samples = {samples!r} has no effect without a tolerance")
         return Conditions(load)
-    count = SAMPLES if samples is None else whole(owner, "samples", samples)
+    count = SAMPLES if samples is None else whole("samples", samples)
     return Conditions(load, sample_deviations(tolerance, mesh, count, seed))
 
 

@@ -29,12 +29,6 @@ Design = Callable[[Parameters], Modifications]
 
 Result = TypeVar("Result")
 
-# where the variables of an engine can be used
-_USES = {
-    "minimize": "design",
-    "sweep": "design, or in a mesh or torque that is a function of the variables",
-}
-
 
 class Variant(NamedTuple):
     """One design with its mesh and its loads.
@@ -125,7 +119,6 @@ class Variants(Checked):
 
 
 def variants(
-    owner: str,
     design: Design,
     mesh: Mesh | Callable[[Parameters], Mesh],
     torque: Loads | Callable[[Parameters], Torque],
@@ -139,7 +132,6 @@ def variants(
     """Checks and collects what the variables of a problem make.
 
     Args:
-        owner: the function that is asked, for messages.
         design: makes (pinion, wheel) modifications from the named variables.
         mesh: prepared mesh, or a function of the named variables that prepares one; traced.
         torque: on the pinion [N m], an `OperatingPoint` or a `LoadSpectrum`; or a function of the named variables that
@@ -155,9 +147,9 @@ def variants(
     # shapes only: the example may be a variant that cannot be
     example = mesh if isinstance(mesh, Mesh) else eqx.filter_eval_shape(partial(call_with, "mesh", mesh), parameters)
     if not isinstance(example, Mesh):
-        raise ValueError(f"{owner}: mesh gives {type(example).__name__}, must be a Mesh as `prepare` makes it")
+        raise ValueError(f"mesh gives {type(example).__name__}, must be a Mesh as `prepare` makes it")
     given = 0.0 if callable(torque) else torque
-    judged = conditions(owner, example, given, tolerance=tolerance, samples=samples, seed=seed)
+    judged = conditions(example, given, tolerance=tolerance, samples=samples, seed=seed)
     fixed = isinstance(mesh, Mesh) and not callable(torque)
     return Variants(
         names=tuple(names),
@@ -196,11 +188,11 @@ def call_with(name: str, function: Callable[[Parameters], Result], parameters: P
         ) from error
 
 
-def check_used(owner: str, names: Sequence[str], used: Sequence[str]) -> None:
+def check_used(names: Sequence[str], used: Sequence[str]) -> None:
     """Raises a `ValueError` that names the variables on which nothing depends."""
     unused = [f'"{name}"' for name in names if name not in used]
     if unused:
-        raise ValueError(f"{owner}: nothing depends on {', '.join(unused)}: use it in {_USES[owner]}, or leave it out")
+        raise ValueError(f"nothing depends on {', '.join(unused)}: use it in design, or leave it out")
 
 
 def two_modifications(made: object) -> tuple[AbstractModification, AbstractModification]:

@@ -47,6 +47,6 @@ def operating_point_of(owner: str, torque: Torque, dtype: np.dtype) -> Operating
                 f"{owner}: torque = {known:g} N m must be at least 0 N m; for the coast flanks prepare the pair's "
                 "`coast` and give the amount of the torque"
             )
-        check(owner, "torque", torque, "N m", low=0.0)
+        check("torque", torque, "N m", low=0.0)
         torque = OperatingPoint(torque)
     return jax.tree.map(lambda part: part.astype(dtype), torque)

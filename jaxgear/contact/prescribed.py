@@ -85,7 +85,7 @@ def solve_at(
         raise ValueError(
             f"solve_at: transmission_error has shape {error.shape}, must be a single number or ({positions},)"
         )
-    check("solve_at", "transmission_error", error, "um")
+    check("transmission_error", error, "um")
     torque = operating_point_of("solve_at", torque, mesh.slice_width.dtype).torque
     check_torque("solve_at", mesh.support_torque, torque)
     flanks, prepared = flanks_of("solve_at", mesh, pinion, wheel), for_contact(mesh)

@@ -44,8 +44,8 @@ def flash_temperature(
     References:
         ISO/TS 6336-20 (ISO/TR 13989-1); H. Blok 1937.
     """
-    check("flash_temperature", "speed", speed, "rpm", low=0.0)
-    check("flash_temperature", "friction", friction, "", low=0.0)
+    check("speed", speed, "rpm", low=0.0)
+    check("friction", friction, "", low=0.0)
     return _flash(cycle, real(speed), real(friction))
 
 
@@ -150,7 +150,7 @@ def friction_coefficient(cycle: MeshCycle, lubricant: Lubricant) -> Scalar:
     if cycle.operating_point.friction is not None:
         return cycle.operating_point.friction
     speed = _running("friction_coefficient", cycle)
-    check("friction_coefficient", "speed", speed, "rpm", low=0.0, open_low=True)
+    check("speed", speed, "rpm", low=0.0, open_low=True)
     contact = cycle.kinematics.path_of_contact
     radius = _normal(cycle.kinematics.pair, contact.reduced_radius(0.0))
     rolling = sum(contact.rolling_speeds(0.0, speed))

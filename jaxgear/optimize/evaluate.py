@@ -99,7 +99,7 @@ def evaluate(
     check_mesh("evaluate", mesh)
     several = quantities if isinstance(quantities, list | tuple) else [quantities]
     if not several:
-        raise ValueError("evaluate: quantities is empty, give at least one")
+        raise ValueError("quantities is empty, give at least one")
     wanted, settings = share_settings([quantity_of(each, "evaluate") for each in several])
     operating_point = operating_point_of("evaluate", torque, mesh.slice_width.dtype)
     given = _Given(mesh, operating_point, *flanks_of("evaluate", mesh, pinion, wheel), settings)

@@ -105,14 +105,14 @@ def free_form(
         ValueError: for numbers outside their range.
         RuntimeError: when no design gave a converged contact solution.
     """
-    whole("free_form", "points", points, _FEWEST)
-    whole("free_form", "steps", steps, 1)
-    check("free_form", "max_relief", max_relief, "um", low=0.0, open_low=True)
-    check("free_form", "curvature", curvature, "um/(um/mm^2)", low=0.0)
+    whole("points", points, _FEWEST)
+    whole("steps", steps, 1)
+    check("max_relief", max_relief, "um", low=0.0, open_low=True)
+    check("curvature", curvature, "um/(um/mm^2)", low=0.0)
     if any(limit.quantity is None for limit in constraints):
-        raise ValueError("free_form: a linear constraint names parameters, and the values of a table have no names")
+        raise ValueError("a linear constraint names parameters, and the values of a table have no names")
     began = time.perf_counter()
-    judged = conditions("free_form", mesh, torque, tolerance=tolerance, samples=samples, seed=seed)
+    judged = conditions(mesh, torque, tolerance=tolerance, samples=samples, seed=seed)
     roll = _roll_lengths(mesh, points)
     width = len(str(points))
     objectives, limits, settings = goals_of([quantities["ppte"]], constraints)
@@ -236,7 +236,7 @@ def project(optimum: Optimum, curve: str = "power") -> Projection:
         ValueError: for an unknown curve.
     """
     if curve not in CURVES:
-        raise ValueError(f'project: curve = "{curve}" is not known, must be one of {", ".join(CURVES)}')
+        raise ValueError(f'curve = "{curve}" is not known, must be one of {", ".join(CURVES)}')
     mesh, torque = optimum.mesh, optimum.cycle.operating_point
     fits = [_fit(side, flank, curve) for side, flank in zip(mesh.sides, (optimum.pinion, optimum.wheel))]
     pinion, wheel = (relief for relief, _ in fits)

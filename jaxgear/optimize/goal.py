@@ -62,8 +62,8 @@ class Constraint(Checked):
             raise ValueError("Constraint: a linear constraint must name at least one free parameter")
         if self.low is None and self.high is None:
             raise ValueError("Constraint: low or high must be given")
-        check("Constraint", "low", self.low, "")
-        check("Constraint", "high", self.high, "", low=self.low)
+        check("Constraint: low", self.low, "")
+        check("Constraint: high", self.high, "", low=self.low)
 
     def of_parameters(self, parameters: Mapping[str, Any]) -> Scalar:
         """Weighted sum of the free parameters that a linear constraint limits, shape ()."""

@@ -211,7 +211,7 @@ def _solve(mesh: Mesh, torque, pinion: AbstractModification, wheel: AbstractModi
     cycle = solve_case(mesh, torque, pinion, wheel)
     if not solved(cycle):
         status = Status(int(cycle_status(cycle)))
-        raise RuntimeError(f"iterate_transmission_error: a contact solution failed: {status.text}: {status.remedy}")
+        raise RuntimeError(f"a contact solution failed: {status.text}: {status.remedy}")
     return cycle
 
 
@@ -296,12 +296,12 @@ def iterate_transmission_error(
         ValueError: for numbers outside their range.
         RuntimeError: when a contact solution does not converge.
     """
-    check("iterate_transmission_error", "torque", torque, "N m", low=0.0, open_low=True)
-    check("iterate_transmission_error", "max_relief", max_relief, "um", low=0.0, open_low=True)
+    check("torque", torque, "N m", low=0.0, open_low=True)
+    check("max_relief", max_relief, "um", low=0.0, open_low=True)
     if max_pressure is not None:
-        check("iterate_transmission_error", "max_pressure", max_pressure, "MPa", low=0.0, open_low=True)
-    check("iterate_transmission_error", "rtol", rtol, "", low=0.0, open_low=True)
-    whole("iterate_transmission_error", "steps", steps, 1)
+        check("max_pressure", max_pressure, "MPa", low=0.0, open_low=True)
+    check("rtol", rtol, "", low=0.0, open_low=True)
+    whole("steps", steps, 1)
     began = time.perf_counter()
     given = pinion or NoModification(), wheel or NoModification()
     limit = None if max_pressure is None else Constraint("max_contact_pressure", high=max_pressure)
@@ -316,7 +316,7 @@ def iterate_transmission_error(
     if limit is None or positions is None:
         found, _ = end_on(mesh, between=False)
     else:
-        found = on_finer_meshes("iterate_transmission_error", mesh, positions, end_on)
+        found = on_finer_meshes(mesh, positions, end_on)
     best, highest = found.iterates[found.best], found.pressures[found.best]
     limits = {"max_relief": Limit(best.max_relief, None, float(max_relief), "um", True)}
     excess = 0.0

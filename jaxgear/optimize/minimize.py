@@ -46,15 +46,15 @@ def method_named(
     given = {name: value for name, value in {"starts": starts, "steps": steps}.items() if value is not None}
     if not isinstance(method, str):
         if given:
-            raise ValueError(f"minimize: {min(given)} must be given to the method, {type(method).__name__}(...)")
+            raise ValueError(f"{min(given)} must be given to the method, {type(method).__name__}(...)")
         return method
     if method not in METHODS:
-        raise ValueError(f'minimize: method "{method}" is not known, must be one of {", ".join(METHODS)}')
+        raise ValueError(f'method "{method}" is not known, must be one of {", ".join(METHODS)}')
     make = METHODS[method]
     options = {field.name for field in fields(make)}
     for name in given:
         if name not in options:
-            raise ValueError(f'minimize: {name} has no effect with method "{method}"')
+            raise ValueError(f'{name} has no effect with method "{method}"')
     return make(**given, **({"seed": seed} if "seed" in options else {}))
 
 
@@ -112,9 +112,9 @@ def minimize(
     """
     method = method_named(method, starts=starts, steps=steps, seed=seed)
     if not (isinstance(objective, str) or callable(objective)):
-        raise ValueError("minimize: objective must be one quantity; jaxgear.optimize.pareto finds a front of several")
+        raise ValueError("objective must be one quantity; jaxgear.optimize.pareto finds a front of several")
     began = time.perf_counter()
-    rounded_to = check_steps("minimize", rounding, bounds)
+    rounded_to = check_steps(rounding, bounds)
     posed = make_problem(
         design,
         bounds,

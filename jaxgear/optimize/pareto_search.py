@@ -123,7 +123,7 @@ class Met:
             seek_limits(self.record.linearizer, self, self.compromise()[0])
         if not self.found:
             raise RuntimeError(
-                "pareto: no evaluated design meets the constraints, also when their violation alone is minimized"
+                "no evaluated design meets the constraints, also when their violation alone is minimized"
             )
         self.thin(most)
 
@@ -252,7 +252,7 @@ def pareto(
         RuntimeError: when no design keeps the constraints.
     """
     if isinstance(objectives, str) or callable(objectives) or len(objectives) < 2:
-        raise ValueError("pareto: objectives must be at least two quantities; a single one is for jaxgear.minimize")
+        raise ValueError("objectives must be at least two quantities; a single one is for jaxgear.minimize")
     began = time.perf_counter()
     posed = make_problem(
         design,
@@ -265,7 +265,6 @@ def pareto(
         tolerance=tolerance,
         samples=samples,
         seed=seed,
-        owner="pareto",
     )
     met = method.search(posed, Record(posed, callback))
     if positions is not None:
@@ -275,7 +274,7 @@ def pareto(
             met, enough = method.end_on(finer, met)
             return met, enough
 
-        met = on_finer_meshes("pareto", mesh, positions, end_on)
+        met = on_finer_meshes(mesh, positions, end_on)
     record = met.record
     record.offer(*met.compromise(), 0.0)
     points, values = met.rows()

@@ -178,7 +178,7 @@ class BinaryGenetic(Checked, AbstractMethod):
         for generation in range(1, self.generations + 1):
             ranks = np.asarray(fitness(record.judge(decoded(strings, self.bits))))
             if (ranks < 0).any():
-                raise ValueError("binary_genetic: needs a positive objective that is minimized")
+                raise ValueError("binary_genetic needs a positive objective that is minimized")
             record.look(generation, self.generations)
             key, breed = jax.random.split(key)
             # relative to the best, so that neither an objective of zero nor its unit matters
@@ -207,7 +207,7 @@ class Factorial(AbstractMethod):
 
     def __check_init__(self) -> None:
         for value in [self.levels] if isinstance(self.levels, int) else dict(self.levels).values():
-            whole("Factorial", "levels", value, 2)
+            whole("Factorial: levels", value, 2)
 
     def search(self, problem: Problem, record: Record) -> None:
         """Evaluates all."""

@@ -301,24 +301,23 @@ def make_problem(
     tolerance: Tolerance | None = None,
     samples: int | None = None,
     seed: int = 0,
-    owner: str = "minimize",
 ) -> Problem:
-    """Checked problem from the arguments of `minimize`; `owner` is the name of the caller, for messages.
+    """Checked problem from the arguments of `minimize`.
 
     Raises:
         ValueError: for empty or reversed bounds, unknown names of objectives or constrained parameters, and whatever
             the cases refuse.
     """
-    names, *ends = box(owner, bounds)
+    names, *ends = box(bounds)
     several = [objective] if isinstance(objective, str | Quantity) or callable(objective) else list(objective)
     if not several:
-        raise ValueError(f"{owner}: objective must name at least one quantity")
+        raise ValueError("objective must name at least one quantity")
     for constraint in constraints:
         for name, _ in constraint.terms:
             if name not in names:
-                raise ValueError(f'{owner}: "{name}" of a constraint must be one of {", ".join(names)}')
-    judged = conditions(owner, mesh, torque, tolerance=tolerance, samples=samples, seed=seed)
-    objectives, limits, settings = goals_of([quantity_of(of, owner) for of in several], constraints)
+                raise ValueError(f'"{name}" of a constraint must be one of {", ".join(names)}')
+    judged = conditions(mesh, torque, tolerance=tolerance, samples=samples, seed=seed)
+    objectives, limits, settings = goals_of([quantity_of(of) for of in several], constraints)
     low, high = (real(np.asarray(side, np.dtype(mesh.slice_width.dtype))) for side in ends)
     posed = Problem(
         design=design,
@@ -334,5 +333,5 @@ def make_problem(
         settings=settings,
     )
     made = Variants(names, design, mesh, None, judged, posed.cases)
-    check_used("minimize", names, made.traced(np.asarray(posed.low))[1])
+    check_used(names, made.traced(np.asarray(posed.low))[1])
     return posed

@@ -22,7 +22,7 @@ Polish = Callable[[Problem, Record, np.ndarray], None]
 Cell = tuple[int, ...]  # of the grid: a multiple of every step
 
 
-def check_steps(owner: str, steps: Mapping[str, float], bounds: Mapping[str, tuple[float, float]]) -> dict[str, float]:
+def check_steps(steps: Mapping[str, float], bounds: Mapping[str, tuple[float, float]]) -> dict[str, float]:
     """Steps of the rounded variables, without those of 0.
 
     Raises:
@@ -30,12 +30,12 @@ def check_steps(owner: str, steps: Mapping[str, float], bounds: Mapping[str, tup
     """
     for name, step in steps.items():
         if name not in bounds:
-            raise ValueError(f'{owner}: "{name}" of rounding must be one of {", ".join(bounds)}')
-        check(owner, f"rounding of {name}", real(step), "", low=0.0)
+            raise ValueError(f'"{name}" of rounding must be one of {", ".join(bounds)}')
+        check(f"rounding of {name}", real(step), "", low=0.0)
         low, high = bounds[name]
         if step and not multiples(step, low, high):
             raise ValueError(
-                f"{owner}: rounding of {name} = {step:g} has no multiple from {low:g} to {high:g}; give a smaller step "
+                f"rounding of {name} = {step:g} has no multiple from {low:g} to {high:g}; give a smaller step "
                 "or 0 for none"
             )
     return {name: float(step) for name, step in steps.items() if step}

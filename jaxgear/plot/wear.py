@@ -33,7 +33,7 @@ def worn_flank(life: WearHistory, gear: Literal["pinion", "wheel"], ax: Axes | N
         ValueError: for another gear.
     """
     if gear not in _GEARS:
-        raise ValueError(f'worn_flank: gear = {gear!r} must be "pinion" or "wheel"')
+        raise ValueError(f'gear = {gear!r} must be "pinion" or "wheel"')
     number = _GEARS.index(gear)
     depths = np.asarray((life.pinion_depth, life.wheel_depth)[number])
     line = int(depths[-1].max(axis=-1).argmax())

@@ -97,9 +97,9 @@ class DesignIdentification(AbstractStudy["IdentificationResult"]):
             pitch: True if single pitch deviations of all teeth are unknowns, within f_pT of the class of their gear.
         """
         for name, given in (("torque-scale", torque_scale), ("offset", offset)):
-            check("identify", name, given, "um" if name == "offset" else "", low=0.0)
+            check(name, given, "um" if name == "offset" else "", low=0.0)
         if noise is not None:
-            check("identify", "noise", noise, "um", low=0.0, open_low=True)
+            check("noise", noise, "um", low=0.0, open_low=True)
         if not design.bounds:
             raise DesignFileError("variables", "missing; identify looks for the values of variables", design.path)
         for free in design.open_case:

@@ -67,7 +67,7 @@ def manufactured_wear(
     Raises:
         ValueError: as `jaxgear.monte_carlo`.
     """
-    cases = conditions("manufactured_wear", mesh, torque, tolerance=tolerance, samples=samples, seed=seed).on(mesh)
+    cases = conditions(mesh, torque, tolerance=tolerance, samples=samples, seed=seed).on(mesh)
     assert cases.removed is not None
     kept = Checkpoints().of(NamedArrays()) if keep is None else keep
     names, load, removed = tuple(asked(settings)), cases.torque[0], cases.removed[0]

@@ -135,11 +135,11 @@ def monte_carlo(
         ValueError: for a torque, a number of samples or a quantile outside its range, unknown results, or lead
             deviations on a mesh of one slice.
     """
-    check("monte_carlo", "torque", torque, "N m", low=0.0)
+    check("torque", torque, "N m", low=0.0)
     levels = np.sort(np.asarray(quantiles, float))
-    check("monte_carlo", "quantiles", levels, "", low=0.0, high=1.0)
-    whole("monte_carlo", "samples", samples, 2)
-    check_slices("monte_carlo", tolerance, mesh)
+    check("quantiles", levels, "", low=0.0, high=1.0)
+    whole("samples", samples, 2)
+    check_slices(tolerance, mesh)
     wanted, settings = share_settings([quantity_of(of, "monte_carlo") for of in results])
     flanks = pinion or NoModification(), wheel or NoModification()
     task = (mesh, real(torque), tolerance, *flanks, jax.random.key(seed))

@@ -105,13 +105,12 @@ def sweep(
             folder that cannot be used or holds a sweep of other settings.
     """
     if part_rows is not None:
-        whole("sweep", "part_rows", part_rows)
+        whole("part_rows", part_rows)
     if not isinstance(plan, AbstractPlan):
         kind = type(plan).__name__
-        raise TypeError(f"sweep: plan is a {kind}, must be FullFactorial, LatinHypercube, Sobol or VariantList")
+        raise TypeError(f"plan is a {kind}, must be FullFactorial, LatinHypercube, Sobol or VariantList")
     example = plan.rows(0, 1)[0]
     made = variants(
-        "sweep",
         design,
         mesh,
         torque,
@@ -122,7 +121,7 @@ def sweep(
         seed=seed,
     )
     traced, used = made.traced(jnp.asarray(example))
-    check_used("sweep", plan.names, used)
+    check_used(plan.names, used)
     wanted = [quantity_of(of, "sweep") for of in results]
     joins = _measures(made.conditions, measures)
     few = plan.size * made.conditions.count <= FEW
@@ -143,7 +142,7 @@ def sweep(
     manifest = Manifest(title, tuple(columns), settings)
     if output is None:
         if jax.process_count() > 1:
-            raise ValueError("sweep: output = None cannot gather the rows of several processes, name a shared folder")
+            raise ValueError("output = None cannot gather the rows of several processes, name a shared folder")
         store, tables = Store("", manifest), []
         all_missing = dict.fromkeys(range(store.parts), True)
         _run(evaluator, plan, store, all_missing, lambda *part: tables.append(store.table(*part)), callback)
@@ -231,10 +230,10 @@ def _measures(conditions: Conditions, given: Sequence[AbstractMeasure] | None) -
             return Mean(), Quantile()
         return (Mean(), Worst()) if conditions.count > 1 else ()
     if conditions.count == 1:
-        raise ValueError("sweep: measures have no effect: one torque and nominal gears are a single case")
+        raise ValueError("measures have no effect: one torque and nominal gears are a single case")
     names = [label(measure) for measure in given]
     if not names or len(set(names)) != len(names):
-        raise ValueError(f"sweep: measures {', '.join(names) or '(none)'} must be different and at least one")
+        raise ValueError(f"measures {', '.join(names) or '(none)'} must be different and at least one")
     return tuple(given)
 
 

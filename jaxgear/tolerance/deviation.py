@@ -94,8 +94,8 @@ def sample_deviations(tolerance: Tolerance, mesh: Mesh, samples: int, seed: int)
     Raises:
         ValueError: for lead deviations on a mesh of one slice, or less than one sample.
     """
-    check_slices("sample_deviations", tolerance, mesh)
-    whole("sample_deviations", "samples", samples)
+    check_slices(tolerance, mesh)
+    whole("samples", samples)
     return _sample(tolerance, mesh, jax.random.key(seed), samples)
 
 
