@@ -36,13 +36,13 @@ def tolerance(mesh):
 
 
 def test_every_torque_meets_the_same_gears(mesh, tolerance):
-    judged = conditions("test", mesh, jg.LoadSpectrum(TORQUES), tolerance=tolerance, samples=3, seed=7)
+    judged = conditions(mesh, jg.LoadSpectrum(TORQUES), tolerance=tolerance, samples=3, seed=7)
     drawn = jg.tolerance.sample_deviations(tolerance, mesh, 3, seed=7)
     jax.tree.map(np.testing.assert_array_equal, judged.deviations, drawn)
     cases = judged.on(mesh)
     assert cases.count == 6 and cases.weights.tolist() == pytest.approx([1 / 6] * 6)
     for row, torque in enumerate(TORQUES):
-        alone = conditions("test", mesh, torque, tolerance=tolerance, samples=3, seed=7).on(mesh)
+        alone = conditions(mesh, torque, tolerance=tolerance, samples=3, seed=7).on(mesh)
         np.testing.assert_allclose(cases.removed[row], alone.removed[0], atol=1e-12)
     # the pitch deviations of a tooth do not depend on the load: they show that the gears are the same ones
     np.testing.assert_allclose(np.ptp(cases.removed[0] - cases.removed[1], axis=0).max(), 0.0, atol=0.5)
@@ -51,7 +51,7 @@ def test_every_torque_meets_the_same_gears(mesh, tolerance):
 def test_every_case_weighs_as_its_torque(mesh, tolerance):
     """Three parts of the time at the first torque, one at the second: so does every gear that runs under them."""
     load = jg.LoadSpectrum(TORQUES, [3.0, 1.0])
-    cases = conditions("test", mesh, load, tolerance=tolerance, samples=3, seed=7).on(mesh)
+    cases = conditions(mesh, load, tolerance=tolerance, samples=3, seed=7).on(mesh)
     torques, weights = (
         np.asarray(cases.each(lambda operating_point, removed: operating_point.torque)),
         np.asarray(cases.weights),
@@ -122,29 +122,29 @@ def test_a_sweep_of_geometry_load_and_flanks_is_a_loop_over_them():
 
 def test_unused_variables_are_named(mesh):
     plan = jg.Sobol({"amount": (0.0, 9.0), "torque": (10.0, 60.0), "lenght": (1.0, 2.0)}, 8, seed=0)
-    with pytest.raises(ValueError, match='^sweep: nothing depends on "torque", "lenght": use it in design'):
+    with pytest.raises(ValueError, match='^nothing depends on "torque", "lenght": use it in design'):
         jg.sweep(design, plan, mesh=mesh, torque=50.0)
-    with pytest.raises(ValueError, match='^sweep: nothing depends on "lenght"'):
+    with pytest.raises(ValueError, match='^nothing depends on "lenght"'):
         jg.sweep(design, plan, mesh=mesh, torque=lambda v: v["torque"])
-    with pytest.raises(ValueError, match='^minimize: nothing depends on "lenght": use it in design'):
+    with pytest.raises(ValueError, match='^nothing depends on "lenght": use it in design'):
         jg.minimize(design, {"amount": (0.0, 9.0), "lenght": (1.0, 2.0)}, mesh=mesh, torque=50.0)
 
 
 def test_what_has_no_effect_is_refused(mesh):
     plan = jg.VariantList(("amount",), [[AMOUNT]])
     for options, words in (
-        ({"measures": (jg.Mean(),)}, "sweep: measures have no effect"),
-        ({"samples": 8}, "sweep: samples = 8 has no effect without a tolerance"),
+        ({"measures": (jg.Mean(),)}, "measures have no effect"),
+        ({"samples": 8}, "samples = 8 has no effect without a tolerance"),
     ):
         with pytest.raises(ValueError, match=words):
             jg.sweep(design, plan, mesh=mesh, torque=50.0, **options)
-    with pytest.raises(ValueError, match="sweep: mesh gives GearPair, must be a Mesh"):
+    with pytest.raises(ValueError, match="mesh gives GearPair, must be a Mesh"):
         jg.sweep(design, plan, mesh=lambda v: pair(), torque=50.0)
 
 
 def test_a_load_has_a_speed(mesh):
     load = jg.LoadSpectrum([50.0, 50.0], speeds=[1000.0, 2000.0], friction=0.05)
-    made = variants("test", design, mesh, load, names=("amount",), values=(AMOUNT,))
+    made = variants(design, mesh, load, names=("amount",), values=(AMOUNT,))
     speeds = made.cases.each(
         lambda operating_point, removed: (operating_point.speed, operating_point.torque * operating_point.friction)
     )
@@ -190,10 +190,10 @@ def test_a_key_error_of_the_user_is_left_alone(mesh):
 @pytest.mark.parametrize(
     ("make", "said"),
     [
-        (lambda: jg.Sobol([("amount", 0.0, 5.0)], 8, seed=0), "Sobol: bounds is a list, must be a dict such as"),
-        (lambda: jg.Sobol({"amount": 5.0}, 8, seed=0), "Sobol: bounds of amount = 5.0 must be two numbers"),
+        (lambda: jg.Sobol([("amount", 0.0, 5.0)], 8, seed=0), "bounds is a list, must be a dict such as"),
+        (lambda: jg.Sobol({"amount": 5.0}, 8, seed=0), "bounds of amount = 5.0 must be two numbers"),
         (lambda: jg.Sobol({"amount": ("0,5", 6)}, 8, seed=0), "'0,5' must be a number, with a decimal point"),
-        (lambda: jg.sweep(None, [1.0], None, 50.0), "sweep: plan is a list, must be FullFactorial"),
+        (lambda: jg.sweep(None, [1.0], None, 50.0), "plan is a list, must be FullFactorial"),
     ],
 )
 def test_a_plan_of_another_type_is_refused_in_one_line(make, said):

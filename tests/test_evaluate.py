@@ -92,11 +92,11 @@ def test_a_gradient_takes_little_more_than_the_value():
 def test_one_quantity_is_a_number_and_what_cannot_be_is_refused():
     number = evaluate("ppte", mesh(), 60.0, **flanks(DESIGN))
     assert number.shape == () and float(number) == pytest.approx(float(with_slope(DESIGN, mesh())[0]), rel=1e-12)
-    with pytest.raises(ValueError, match=r'^evaluate: "pptee" is not known, did you mean "ppte"\?$'):
+    with pytest.raises(ValueError, match=r'^"pptee" is not known, did you mean "ppte"\?$'):
         evaluate("pptee", mesh(), 60.0)
-    with pytest.raises(ValueError, match="^evaluate: quantities is empty, give at least one$"):
+    with pytest.raises(ValueError, match="^quantities is empty, give at least one$"):
         evaluate([], mesh(), 60.0)
-    with pytest.raises(TypeError, match="^evaluate: mesh is a float, must be a Mesh"):
+    with pytest.raises(TypeError, match="^mesh is a float, must be a Mesh"):
         evaluate("ppte", 60.0, mesh())
 
 

@@ -130,7 +130,7 @@ def test_one_slice_has_no_load_over_the_face():
     cycle = jg.solve(mesh, 50.0)
     for name in (*NAMES, "face_load_factors"):
         function = quantities[name] if name in NAMES else face_load_factors
-        with pytest.raises(ValueError, match=f"^{name}: a mesh of 1 slice has no load over the face"):
+        with pytest.raises(ValueError, match="a mesh of 1 slice has no load over the face"):
             function(cycle)
     assert "face_load_factor" not in eqx.filter_eval_shape(summary, cycle)
     with pytest.raises(ValueError, match="^face_load_factor: a mesh of 1 slice"):

@@ -183,7 +183,7 @@ def test_parameters_of_bits_lie_on_their_steps_and_a_negative_objective_is_refus
     result = known.minimize(known.parabolas, TALL, method=method)
     steps = np.array(list(result.parameters.values())) / 40.0 * 7
     assert np.allclose(steps, np.round(steps))
-    with pytest.raises(ValueError, match="binary_genetic: needs a positive objective that is minimized"):
+    with pytest.raises(ValueError, match="needs a positive objective that is minimized"):
         known.minimize(known.parabolas, TALL, method=method, objective=lambda cycle: -cycle.pinion.amount - 1.0)
 
 

@@ -435,9 +435,9 @@ def test_another_design_or_mesh_is_another_sweep(mesh, folder):
     [
         ({"results": ()}, "results must be different and at least one"),
         ({"results": ("ppte", "ppte")}, "results must be different"),
-        ({"results": ("noise",)}, 'sweep: "noise" is not known'),
+        ({"results": ("noise",)}, '"noise" is not known'),
         ({"part_rows": 0}, "part_rows = 0 must be a whole number of at least 1"),
-        ({"torque": -1.0}, "sweep: torque = -1 N m must be at least 0"),
+        ({"torque": -1.0}, "torque = -1 N m must be at least 0"),
     ],
 )
 def test_wrong_arguments_are_refused_before_anything_is_written(mesh, tmp_path, options, problem):

@@ -656,6 +656,6 @@ def test_other_files_are_refused_in_one_line(tmp_path):
 
 
 def test_pictures_of_other_gears_are_refused_in_one_line():
-    with pytest.raises(ValueError, match='worn_flank: gear = \'rack\' must be "pinion" or "wheel"') as refused:
+    with pytest.raises(ValueError, match='gear = \'rack\' must be "pinion" or "wheel"') as refused:
         plot.worn_flank(None, "rack")
     assert "\n" not in str(refused.value)

@@ -167,7 +167,7 @@ class Conditions(Checked):
 
     def on(self, mesh: Mesh) -> "Cases":
         """The cases on a mesh; traceable, where every design has a mesh of its own."""
-        check_torque("load", mesh.support_torque, self.load.torques)
+        check_torque(mesh.support_torque, self.load.torques)
         load = jax.tree.map(lambda numbers: numbers.astype(mesh.slice_width.dtype), self.load)
         removed = None if self.deviations is None else _removed(mesh, load.torques, self.deviations)
         return Cases(load.torques, load.speeds, load.friction, load.weights, removed)
@@ -257,7 +257,7 @@ def conditions(
     if isinstance(torque, LoadSpectrum):
         load = torque
     else:
-        load = LoadSpectrum.of(operating_point_of("torque", torque, real(0.0).dtype))
+        load = LoadSpectrum.of(operating_point_of(torque, real(0.0).dtype))
     if tolerance is None:
         if samples is not None:
             raise ValueError(f"samples = {samples!r} has no effect without a tolerance")

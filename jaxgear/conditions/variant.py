@@ -83,7 +83,7 @@ class Variants(Checked):
             conditions = self.conditions
             if self.torque is not None:
                 operating_point = operating_point_of(
-                    "torque", call_with("torque", self.torque, parameters), mesh.slice_width.dtype
+                    call_with("torque", self.torque, parameters), mesh.slice_width.dtype
                 )
                 made.append(operating_point)
                 conditions = Conditions(LoadSpectrum.of(operating_point), conditions.deviations)
@@ -106,7 +106,7 @@ class Variants(Checked):
             whole = self if mesh is None else eqx.tree_at(lambda tree: tree.mesh, self, mesh)
             variant = whole(values)
             first = variant.cases.first
-            both = flanks_of("removed_material", variant.mesh, variant.pinion, variant.wheel)
+            both = flanks_of(variant.mesh, variant.pinion, variant.wheel)
             # where the contacts slide to takes longer to trace
             removed = nominal_material(variant.mesh, first.torque, *both)
             own = None if mesh is not None else (variant.mesh, variant.cases)

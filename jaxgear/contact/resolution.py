@@ -195,11 +195,11 @@ def end_relief_widths(face_width: Given, length: Given, slices: int = 11) -> tup
             best = missed, made
     if best is None:
         least = _OVER_RELIEF * float(face_width) / _MOST_PARTS
-        raise ValueError(f"end_relief_widths: length = {float(length):g} mm must be at least {least:g} mm on this face")
+        raise ValueError(f"length = {float(length):g} mm must be at least {least:g} mm on this face")
     missed, made = best
     if missed > _MISSED:
         raise ValueError(
-            f"end_relief_widths: slices = {slices} are too many for a relief of length = {float(length):g} mm on "
+            f"slices = {slices} are too many for a relief of length = {float(length):g} mm on "
             f"{float(face_width):g} mm: those between the reliefs would be narrower than those at their ends"
         )
     return made

@@ -97,8 +97,8 @@ def force_and_mesh(
     reach: Given = _REACH,
 ) -> tuple[AbstractMeshForce, Mesh]:
     """`mesh_force`, and the mesh that it was made on."""
-    check_mesh("mesh_force", mesh)
-    torque = operating_point_of("mesh_force", torque, mesh.slice_width.dtype).torque
+    check_mesh(mesh)
+    torque = operating_point_of(torque, mesh.slice_width.dtype).torque
     check("torque", torque, "N m", low=0.0, open_low=True)
     series = _number("compliance", compliance, "um/N", mesh, low=0.0)
     farthest = _number("reach", reach, "", mesh, low=1.0)

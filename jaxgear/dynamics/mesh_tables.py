@@ -157,7 +157,7 @@ def mesh_tables(
     check_mesh("mesh_tables", mesh)
     most = (mesh.resolution.positions - 1) // 2
     count = min(_ORDERS, most) if orders is None else whole("orders", orders, 1, most)
-    load = operating_point_of("mesh_tables", torque, mesh.slice_width.dtype).torque
+    load = operating_point_of(torque, mesh.slice_width.dtype).torque
     check("torque", load, "N m", low=0.0, open_low=True)
     every = np.unique([float(load), *np.asarray(torques, float).ravel()])
     check("torques", jnp.asarray(every), "N m", low=0.0)

@@ -441,7 +441,7 @@ def _constraint(design: DesignFile, section: ConstraintSection) -> Constraint:
     if isinstance(of, str):
         of = quantity_named(design, f"{key}.of", of)
         _check_reachable(design, f"{key}.low", of, section.low)
-        unit = quantity_of(of, key).unit
+        unit = quantity_of(of).unit
     else:
         for name in of:
             if name not in design.bounds:
@@ -468,7 +468,7 @@ def _rounding(design: DesignFile, section: OptimizeSection) -> dict[str, float]:
         if name not in design.bounds:
             problem = f'"{name}" is not a variable, {suggestion(name, design.bounds)}'
             raise DesignFileError(f"{asked.at}.variables", problem)
-    return refused(asked.at, check_steps, "optimize", {**steps, **(asked.variables or {})}, design.bounds)
+    return refused(asked.at, check_steps, {**steps, **(asked.variables or {})}, design.bounds)
 
 
 def _check_reachable(design: DesignFile, key: str, of: str | Quantity, low: float | None) -> None:

@@ -195,7 +195,7 @@ def summed(pair: GearPair, found: Loaded, load: LoadSpectrum, strength: Strength
     bending = [bent * share for share in root]
 
     def of(name: Mode, stresses) -> OfGears:
-        shares = damage_per_cycle("damage", strength, name, tuple(stresses))
+        shares = damage_per_cycle(strength, name, tuple(stresses))
         # a load that is never run does nothing, even where it has not been found
         return jnp.stack([jnp.where(run > 0, run * each, 0.0) for run, each in zip(cycles, shares)])
 

@@ -355,7 +355,7 @@ def _named(name: str, found: Callable[[], Any], **beside: Any) -> Any:
         return found()
     except ValueError as error:
         shown = [f"with {key} = {value:g}" for key, value in beside.items() if concrete(value) is not None]
-        text = ", ".join([str(error).partition(": ")[2], *shown])
+        text = ", ".join([str(error), *shown])
         raise ValueError(f"ToothThickness: {name}: {text}") from error
 
 

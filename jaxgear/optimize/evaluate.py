@@ -96,13 +96,13 @@ def evaluate(
     Raises:
         TypeError, ValueError: as `solve` does; for a quantity that is not known or lacks its settings, and for none.
     """
-    check_mesh("evaluate", mesh)
+    check_mesh(mesh)
     several = quantities if isinstance(quantities, list | tuple) else [quantities]
     if not several:
         raise ValueError("quantities is empty, give at least one")
-    wanted, settings = share_settings([quantity_of(each, "evaluate") for each in several])
-    operating_point = operating_point_of("evaluate", torque, mesh.slice_width.dtype)
-    given = _Given(mesh, operating_point, *flanks_of("evaluate", mesh, pinion, wheel), settings)
+    wanted, settings = share_settings([quantity_of(each) for each in several])
+    operating_point = operating_point_of(torque, mesh.slice_width.dtype)
+    given = _Given(mesh, operating_point, *flanks_of(mesh, pinion, wheel), settings)
     if is_eager() or not all(each.local and _pieces(each) for each in wanted):
         numbers = _numbers(wanted, given)
     else:

@@ -53,7 +53,7 @@ class Constraint(Checked):
     def __init__(
         self, of: Objective | Mapping[str, float], *, low: Numbers | None = None, high: Numbers | None = None
     ) -> None:
-        self.quantity = None if isinstance(of, Mapping) else quantity_of(of, "Constraint")
+        self.quantity = None if isinstance(of, Mapping) else quantity_of(of)
         self.terms = tuple(of.items()) if isinstance(of, Mapping) else ()
         self.low, self.high = optional_real(low), optional_real(high)
 

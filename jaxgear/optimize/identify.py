@@ -373,7 +373,7 @@ def _posed(
     single_pitch: Pitches | None,
     model_error: float,
 ) -> tuple[_Problem, Data]:
-    check_mesh("identify", mesh)
+    check_mesh(mesh)
     if not prior:
         raise ValueError("prior must name at least one unknown")
     every = dict(prior)

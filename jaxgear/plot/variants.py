@@ -227,7 +227,7 @@ def ppte_distribution(
     Raises:
         ValueError: for an unknown name.
     """
-    quantity = quantity_of(of, "ppte_distribution")
+    quantity = quantity_of(of)
     unit = printed_unit(quantity.unit)
     with report_axes(ax) as ax:
         for index, name, given in styled(samples):

@@ -63,7 +63,7 @@ def wear_history(
             function of a cycle.
         ax: Axes to draw into; None for a new figure.
     """
-    known = quantity_of(quantity, "wear_history")
+    known = quantity_of(quantity)
     with report_axes(ax) as ax:
         for index, name, life in styled(of):
             values = wear_depth(life) if quantity == "wear_depth" else over_life(life, known)

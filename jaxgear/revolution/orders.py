@@ -178,4 +178,4 @@ def tooth_shares(revolution: Revolution, gear: GearName) -> Float[Array, "*batch
 
 def over_revolution(revolution: Revolution, of: str | Quantity) -> Float[Array, "*batch windows"]:
     """A quantity of mesh cycles, a name or a `Quantity`, in every window, shape (windows,)."""
-    return MESH_QUANTITIES.quantity_of(of, "over_revolution")(revolution.cycles)
+    return MESH_QUANTITIES.quantity_of(of)(revolution.cycles)

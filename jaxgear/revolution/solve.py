@@ -145,12 +145,12 @@ def solve_revolution(
         TypeError: for something else than a prepared mesh, settings of teeth or a modification.
         ValueError: for deviations of another number of teeth, and as `solve`.
     """
-    check_mesh("solve_revolution", mesh)
+    check_mesh(mesh)
     if not isinstance(teeth, Teeth):
         raise TypeError(f"teeth is a {type(teeth).__name__}, must be of Teeth")
-    operating_point = operating_point_of("solve_revolution", torque, mesh.slice_width.dtype)
-    check_torque("solve_revolution", mesh.support_torque, operating_point.torque)
-    flanks = flanks_of("solve_revolution", mesh, pinion, wheel)
+    operating_point = operating_point_of(torque, mesh.slice_width.dtype)
+    check_torque(mesh.support_torque, operating_point.torque)
+    flanks = flanks_of(mesh, pinion, wheel)
     _check_slices(mesh, teeth)
     counts = teeth.counts_of(mesh.pair)
     windows = teeth.windows(counts)

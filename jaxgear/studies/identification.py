@@ -118,7 +118,7 @@ class DesignIdentification(AbstractStudy["IdentificationResult"]):
         try:
             data.noise_on(sizes, period_of(data, design.pair(), pitches, offset or None))
         except ValueError as error:
-            says = str(error).removeprefix("identify: ")
+            says = str(error)
             key, help_ = next((key, help_) for begin, key, help_ in _HELP if says.startswith(begin))
             raise DesignFileError(key, says.removeprefix(f"{key} ") + help_, study.measured) from None
         return study
@@ -152,7 +152,7 @@ class DesignIdentification(AbstractStudy["IdentificationResult"]):
                 candidates=self._further(),
             )
         except ValueError as error:
-            raise DesignFileError("variables", str(error).removeprefix("identify: "), self.design.path) from None
+            raise DesignFileError("variables", str(error), self.design.path) from None
         return IdentificationResult(self.design, self.measured, mesh, self.prior, found)
 
 

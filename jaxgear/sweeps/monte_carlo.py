@@ -66,7 +66,7 @@ class Scatter(Checked):
         Raises:
             ValueError: for a result that was not asked for.
         """
-        wanted = quantity_of(of, "Scatter")
+        wanted = quantity_of(of)
         known = {"ppte_um": self.ppte, **self.numbers}
         if wanted.key not in known:
             raise ValueError(f'Scatter: "{wanted.key}" is not among the results, must be one of {", ".join(known)}')
@@ -140,7 +140,7 @@ def monte_carlo(
     check("quantiles", levels, "", low=0.0, high=1.0)
     whole("samples", samples, 2)
     check_slices(tolerance, mesh)
-    wanted, settings = share_settings([quantity_of(of, "monte_carlo") for of in results])
+    wanted, settings = share_settings([quantity_of(of) for of in results])
     flanks = pinion or NoModification(), wheel or NoModification()
     task = (mesh, real(torque), tolerance, *flanks, jax.random.key(seed))
     curves, converged, numbers = _run(task, wanted, settings, samples + 1)

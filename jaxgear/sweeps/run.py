@@ -122,7 +122,7 @@ def sweep(
     )
     traced, used = made.traced(jnp.asarray(example))
     check_used(plan.names, used)
-    wanted = [quantity_of(of, "sweep") for of in results]
+    wanted = [quantity_of(of) for of in results]
     joins = _measures(made.conditions, measures)
     few = plan.size * made.conditions.count <= FEW
     if part_rows is None:

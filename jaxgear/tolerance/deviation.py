@@ -159,9 +159,7 @@ def flank_basis(mesh: Mesh, torque: Torque) -> Float[Array, "terms pairs slices 
 
     def removed(side: str, modification: AbstractModification) -> Load:
         flanks = {"pinion": NoModification(), "wheel": NoModification(), side: modification}
-        return nominal_material(
-            mesh, operating_point_of("flank_basis", torque, mesh.slice_width.dtype).torque, **flanks
-        )
+        return nominal_material(mesh, operating_point_of(torque, mesh.slice_width.dtype).torque, **flanks)
 
     def terms(side: str) -> Iterator[Array]:
         yield removed(side, ProfileSlope(unit))[None]

@@ -380,11 +380,11 @@ def case_of(
     line_load: LineLoad | None = None,
 ) -> Case:
     """Checks and collects what wears; arguments and errors as `wear`."""
-    check_mesh("wear", mesh)
-    pinion, wheel = flanks_of("wear", mesh, pinion, wheel)
+    check_mesh(mesh)
+    pinion, wheel = flanks_of(mesh, pinion, wheel)
     dtype = mesh.slice_width.dtype
     loads, weights = _loads(torque, dtype)
-    check_torque("wear", mesh.support_torque, loads.torque)
+    check_torque(mesh.support_torque, loads.torque)
     law = wear_law(coefficient, loads, dtype)
     points = points_for(mesh.resolution.positions) if points is None else whole("points", points, low=3)
     other = _deviation(mesh, deviation)
@@ -409,7 +409,7 @@ def _deviation(mesh: Mesh, deviation: Numbers | None) -> Float[Array, "*shape"]:
 def _loads(torque: Loads, dtype: np.dtype) -> tuple[OperatingPoint, Float[Array, " torques"] | None]:
     """Operations with a leading axis (torques,), and the shares of a spectrum; None for a single load."""
     if not isinstance(torque, LoadSpectrum):
-        single = operating_point_of("wear", torque, dtype)
+        single = operating_point_of(torque, dtype)
         return jax.tree.map(lambda number: number[None], single), None
     load = jax.tree.map(lambda number: number.astype(dtype), torque)
     friction = None if load.friction is None else jnp.broadcast_to(load.friction, load.torques.shape)

@@ -34,7 +34,7 @@ def over_life(history: WearHistory, of: Measured, measure: AbstractMeasure | Non
         ValueError: for an unknown name, and for the dynamic factor of a life without dynamics.
     """
     _single(history)
-    quantity = _quantity_of(of, "over_life")
+    quantity = _quantity_of(of)
     if quantity.name == "dynamic_factor" and quantity.takes is Dynamics:
         if history.dynamic_factor is None:
             raise ValueError('"dynamic_factor" needs a wear history with dynamics: wear(..., dynamics=Dynamics(...))')
@@ -123,7 +123,7 @@ def life_to(history: WearHistory, of: Measured, limit: Given, measure: AbstractM
         history, of, measure: as for `over_life`.
         limit: in the unit of the quantity.
     """
-    quantity = _quantity_of(of, "life_to")
+    quantity = _quantity_of(of)
     limit = real(limit).astype(history.revolutions.dtype)
     check("limit", limit, quantity.unit)
     values = over_life(history, quantity, measure)
