@@ -24,10 +24,10 @@ from jaxgear.layout import (
     crowning_off_the_edges,
     damage,
     face_load_over_torques,
-    findings_of,
     flank_line_tolerance,
     gear_lives,
     helix_slope_limits,
+    layout_findings,
     layout_flank_lines,
     level_load,
     lives_in_cases,
@@ -301,12 +301,14 @@ def softened(radial):
 
 @pytest.mark.slow
 def test_usual_shafts_have_no_finding_and_slips_of_a_unit_do(layout):
-    (thick,) = findings_of(layout, SUPPORT)  # a bore of 40 mm on a shaft of 45 mm
+    (thick,) = layout_findings(layout, SUPPORT)  # a bore of 40 mm on a shaft of 45 mm
     assert (thick.key, thick.where, thick.value) == ("shaft diameter over bore", 'gear "w2"', 45.0 / 40.0)
     soft = softened(0.1)
     options = {"torque": OWN_TORQUE, "gear": "pinion", "stations": STATIONS}
     found = layout_flank_lines(soft, FlankLineTolerance(8.0), further=helix_slope_limits(SUPPORT.pair, 6), **options)
-    told = {(finding.key, finding.where): finding for finding in findings_of(found, soft) if finding.key != thick.key}
+    told = {
+        (finding.key, finding.where): finding for finding in layout_findings(found, soft) if finding.key != thick.key
+    }
     bearings = {("radial stiffness", f'bearing "{name}"') for name in "CE"}
     moved = {("radial displacement in modules", f'bearing "{name}"') for name in "CE"}
     flank = {("K_Hbeta", "without modification"), ("slope and crowning in modules", "pinion")}
@@ -316,7 +318,7 @@ def test_usual_shafts_have_no_finding_and_slips_of_a_unit_do(layout):
     # nearly all of the load is on one of the stations
     few = told["K_Hbeta", "without modification"]
     assert few.value > 0.5 * STATIONS and few.usual.high == STATIONS / 4
-    stiff = findings_of(layout, softened(5e5))
+    stiff = layout_findings(layout, softened(5e5))
     assert {finding.key for finding in stiff} == {"radial stiffness", thick.key}
     assert str(stiff[0]).startswith('bearing "C", radial stiffness 500000 N/um is more than 20000 N/um (')
 
@@ -328,7 +330,7 @@ def test_crowning_that_costs_more_than_bending_is_a_finding():
     (level, *_), (crowned, *_) = (of["tolerance"].face_load_factor for of in (found.unmodified, found.after))
     assert float(level) == pytest.approx(1.0) and float(crowned) > 1.2 and float(found.needed) < 0.5 * sum(lines)
     contact = {"unmodified": [1.176, 1.5], "step 1": [1.0, 1.45], "step 2": [1.856, 1.9]}
-    told = {(each.key, each.where): each for each in findings_of(found, rigid(), contact={"tolerance": contact})}
+    told = {(each.key, each.where): each for each in layout_findings(found, rigid(), contact={"tolerance": contact})}
     name, worst = "K_Hbeta without deviations", "K_Hbeta of the worst case"
     of_contact = worst, "after step 2, tolerance deviations, contact analysis"
     of_annex_e = worst, "after step 2, tolerance deviations"
@@ -338,7 +340,7 @@ def test_crowning_that_costs_more_than_bending_is_a_finding():
         "after step 2, contact analysis, K_Hbeta without deviations 1.856 is more than 1.411 (more than 1.2 times that"
     )
     least = layout_flank_lines(rigid(), tolerance, torque=TORQUE, stations=STATIONS)
-    assert not findings_of(least, rigid(), contact={"tolerance": contact | {"step 2": [1.3, 1.4]}})
+    assert not layout_findings(least, rigid(), contact={"tolerance": contact | {"step 2": [1.3, 1.4]}})
 
 
 def test_slips_that_the_load_does_not_show_are_findings(layout, monkeypatch):
@@ -356,7 +358,9 @@ def test_slips_that_the_load_does_not_show_are_findings(layout, monkeypatch):
     asked = importlib.import_module("jaxgear.layout.findings")
     monkeypatch.setattr(asked, "bearing_reactions", lambda gearbox: still)
     cases = replace(layout.before["maximum"], slope=1e-3 * layout.before["maximum"].slope)
-    told = {(each.key, each.where) for each in findings_of(replace(layout, before={"maximum": cases}), support(box, 0))}
+    told = {
+        (each.key, each.where) for each in layout_findings(replace(layout, before={"maximum": cases}), support(box, 0))
+    }
     assert told == {
         ("clearance", 'bearing "A"'),
         ("distance from the face", 'bearing "D"'),
@@ -370,7 +374,7 @@ def test_slips_that_the_load_does_not_show_are_findings(layout, monkeypatch):
     # of step 3, in mm on one gear and far too deep on the other
     amounts = {"pinion_amount": np.array([0.0, 0.02]), "wheel_amount": np.array([0.0, 900.0])}
     tried = SimpleNamespace(table=SimpleNamespace(column=amounts.get))
-    told = {(each.key, each.where) for each in findings_of(layout, rigid(), profiles=tried)}
+    told = {(each.key, each.where) for each in layout_findings(layout, rigid(), profiles=tried)}
     deep = ("depth of the modification in modules", "wheel")
     assert told == {("depth of the modification", "pinion"), deep}
 
@@ -557,9 +561,9 @@ def test_layout_for_a_duty_cycle_tells_relative_lives(bent):
     assert 0 < float(worst.largest) < 1
     fast = replace(load, speeds=1e3 * load.speeds)
     spent = replace(found, damage=(*found.damage[:2], replace(worst, pitting=worst.pitting * 1.5 / worst.largest)))
-    usual = {each.key for each in findings_of(found, bent, duty_cycle=load)}
+    usual = {each.key for each in layout_findings(found, bent, duty_cycle=load)}
     for layout, cycle, name in ((found, fast, "pitch line velocity"), (spent, load, "damage by the duty cycle")):
-        (finding,) = [each for each in findings_of(layout, bent, duty_cycle=cycle) if each.key not in usual]
+        (finding,) = [each for each in layout_findings(layout, bent, duty_cycle=cycle) if each.key not in usual]
         assert finding.key == name
     assert finding.value == pytest.approx(1.5) and finding.where == "after step 2"
 

@@ -528,11 +528,11 @@ def test_an_optimizer_keeps_to_what_the_wheel_grinds(moving):
         return relief, relief
 
     bounds = {"amount": (2.0, 12.0), "length": (2.0, 6.0), "exponent": (1.0, 4.0)}
-    options = {"mesh": mesh, "torque": 200.0, "starts": 1, "steps": 12, "positions": None}
-    free = jg.minimize(design, bounds, **options)
+    posed, search = (mesh, 200.0, design, bounds), jg.optimize.SLP(starts=1, steps=12)
+    free = jg.minimize(jg.Problem(*posed), search, positions=None)
     limit = 0.25 * float(jg.quantities["pinion_quadratic_deviation"](free.cycle))
     limits = [jg.Constraint(f"{gear}_quadratic_deviation", high=limit) for gear in ("pinion", "wheel")]
-    held = jg.minimize(design, bounds, constraints=limits, **options)
+    held = jg.minimize(jg.Problem(*posed, constraints=limits), search, positions=None)
     for gear in ("pinion", "wheel"):
         assert float(jg.quantities[f"{gear}_quadratic_deviation"](held.cycle)) <= 1.01 * limit
     assert free.ppte <= held.ppte < float(jg.peak_to_peak(jg.solve(mesh, 200.0).transmission_error))

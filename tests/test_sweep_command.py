@@ -107,7 +107,7 @@ def test_the_table_is_that_of_the_library(folder):
     )
     file = load_design(folder / "gear.toml")
     plan = sweep_request(file).plan
-    direct = jg.sweep(file.design, plan, mesh=file.mesh(), torque=50.0, results=("ppte", "effective_contact_ratio"))
+    direct = jg.sweep(file.mesh(), 50.0, file.design, plan, results=("ppte", "effective_contact_ratio"))
     np.testing.assert_array_equal(table.column("ppte_um"), direct.column("ppte_um"))
 
 
@@ -147,7 +147,7 @@ def test_repeated_it_finds_everything_there(folder):
     result = sweep(folder / "gear.toml", "-o", folder / "out")
     assert result.code == 0 and "resuming, 60 of 60 variants are complete" in result.err
     assert {path.name: path.stat().st_mtime_ns for path in (folder / "out" / "table").glob("part-*")} == before
-    other = sweep(folder / "gear.toml", "-o", folder / "out", "--samples", "61")
+    other = sweep(folder / "out", "--samples", folder / "gear.toml", "-o")
     assert_refused(other, "table: holds a sweep of other settings (plan, variants)")
 
 

@@ -638,7 +638,7 @@ def test_lives_of_many_designs_are_asked_one_by_one(life):
         "worn_volume": worn_volume,
     }
     mapped = jax.jit(jax.vmap(lambda life: [of(life) for of in asked.values()]))(many)
-    for (name, of), found in zip(asked.items(), mapped):
+    for of, found in zip(asked.values(), mapped):
         with pytest.raises(ValueError, match="history is of a batch of designs, must be of one"):
             of(many)
         np.testing.assert_array_equal(np.asarray(found)[1], of(life))
@@ -656,7 +656,7 @@ def test_steps_are_gone_through_and_kept_two_by_two(mesh, life):
         return make()
 
     steps = steps_of(mesh, keep=keep, callback=lambda *given: seen.append(given))
-    assert len(kept) == BLOCKS / 2 and seen[-1] == (REVOLUTIONS, REVOLUTIONS)
+    assert len(kept) == BLOCKS / 2 and seen[-1] == (REVOLUTIONS, REVOLUTIONS, None)
     np.testing.assert_array_equal(steps.depth, life.depth)
 
 

@@ -11,8 +11,8 @@ from jaxtyping import Array, Float
 from ..contact import Mesh, OperatingPoint
 from ..contact.face_coupling import check_torque
 from ..contact.operating_point import Torque, operating_point_of
-from ..numerics import Checked, Given, Numbers, check, concrete, number, optional_real, program, real, result, whole
-from ..tolerance import Deviation, Tolerance, sample_deviations
+from ..numerics import Checked, Given, Numbers, check, concrete, number, optional_real, program, real, result
+from ..tolerance import Deviation, ManufacturedGears
 from ..tolerance.deviation import deviation_field, flank_basis
 
 
@@ -135,7 +135,6 @@ def _alone(number: Array) -> Array | np.ndarray:
 
 
 _MINUTES = 60.0  # in an hour
-SAMPLES = 64  # manufactured pairs, where nothing is said
 
 Loads = Torque | LoadSpectrum  # one load or several
 Result = TypeVar("Result")  # a tree of arrays
@@ -233,37 +232,20 @@ class Cases(Checked):
         return jax.vmap(at, (0, None))(loads, nothing)
 
 
-def conditions(
-    mesh: Mesh,
-    torque: Loads,
-    *,
-    tolerance: Tolerance | None = None,
-    samples: int | None = None,
-    seed: int = 0,
-) -> Conditions:
-    """Conditions of a torque or a load spectrum, with manufactured gears where there is a tolerance.
+def conditions(mesh: Mesh, torque: Loads, manufactured: ManufacturedGears | None = None) -> Conditions:
+    """Conditions of a torque or a load spectrum.
 
     Args:
         mesh: prepared mesh; its number of pairs and its floating-point type count, nothing else.
         torque: on the pinion [N m], an `OperatingPoint`, or a `LoadSpectrum`.
-        tolerance: of manufactured gears; None for nominal ones.
-        samples: manufactured pairs, which run under every torque; None for 64. Sample i depends on the seed and on i
-            alone, see `sample_deviations`.
-        seed: of their deviations.
+        manufactured: manufactured gears, which run under every torque; None for nominal ones.
 
     Raises:
-        ValueError: for a negative torque, samples without a tolerance, and for lead deviations on a mesh of one slice.
+        ValueError: for a negative torque, and for lead deviations on a mesh of one slice.
     """
-    if isinstance(torque, LoadSpectrum):
-        load = torque
-    else:
-        load = LoadSpectrum.of(operating_point_of(torque, real(0.0).dtype))
-    if tolerance is None:
-        if samples is not None:
-            raise ValueError(f"samples = {samples!r} has no effect without a tolerance")
-        return Conditions(load)
-    count = SAMPLES if samples is None else whole("samples", samples)
-    return Conditions(load, sample_deviations(tolerance, mesh, count, seed))
+    if not isinstance(torque, LoadSpectrum):
+        torque = LoadSpectrum.of(operating_point_of(torque, real(0.0).dtype))
+    return Conditions(torque, None if manufactured is None else manufactured.on(mesh))
 
 
 @program

@@ -19,7 +19,7 @@ from ..contact.solve import flanks_of
 from ..contact.status import Status, Statuses, status_of
 from ..microgeometry import AbstractModification, NoModification
 from ..numerics import Checked, program, real, within_limits
-from ..tolerance import Tolerance
+from ..tolerance import ManufacturedGears
 from .cases import Cases, Conditions, Loads, LoadSpectrum, conditions
 
 Scalar = Float[Array, ""]
@@ -119,26 +119,24 @@ class Variants(Checked):
 
 
 def variants(
-    design: Design,
     mesh: Mesh | Callable[[Parameters], Mesh],
     torque: Loads | Callable[[Parameters], Torque],
+    design: Design,
     *,
     names: Sequence[str],
     values: Sequence[Any] | np.ndarray | Array,
-    tolerance: Tolerance | None = None,
-    samples: int | None = None,
-    seed: int = 0,
+    manufactured: ManufacturedGears | None = None,
 ) -> Variants:
-    """Checks and collects what the variables of a problem make.
+    """Variants of a mesh and a load, checked.
 
     Args:
-        design: makes (pinion, wheel) modifications from the named variables.
         mesh: prepared mesh, or a function of the named variables that prepares one; traced.
         torque: on the pinion [N m], an `OperatingPoint` or a `LoadSpectrum`; or a function of the named variables that
             gives a torque or an operating point.
+        design: makes (pinion, wheel) modifications from the named variables.
         names: of the variables.
         values: of the variables of one variant, by which the functions are tried.
-        tolerance, samples, seed: of manufactured gears, see `conditions`.
+        manufactured: manufactured gears, see `conditions`.
 
     Raises:
         ValueError: for whatever the functions and `conditions` refuse.
@@ -148,8 +146,7 @@ def variants(
     example = mesh if isinstance(mesh, Mesh) else eqx.filter_eval_shape(partial(call_with, "mesh", mesh), parameters)
     if not isinstance(example, Mesh):
         raise ValueError(f"mesh gives {type(example).__name__}, must be a Mesh as `prepare` makes it")
-    given = 0.0 if callable(torque) else torque
-    judged = conditions(example, given, tolerance=tolerance, samples=samples, seed=seed)
+    judged = conditions(example, 0.0 if callable(torque) else torque, manufactured)
     fixed = isinstance(mesh, Mesh) and not callable(torque)
     return Variants(
         names=tuple(names),

@@ -154,7 +154,7 @@ def mesh_tables(
         TypeError: for something else than a prepared mesh or modifications.
         ValueError: in one line for a number outside its range, and where `mesh_force` raises one.
     """
-    check_mesh("mesh_tables", mesh)
+    check_mesh(mesh)
     most = (mesh.resolution.positions - 1) // 2
     count = min(_ORDERS, most) if orders is None else whole("orders", orders, 1, most)
     load = operating_point_of(torque, mesh.slice_width.dtype).torque

@@ -185,8 +185,8 @@ def vary_profiles(
     own = _results(mesh.pair)
     wanted = (*own, *(one for one in results if one not in own))
     plan, units = _plan(rows)
-    given: dict[str, Any] = {"mesh": mesh, "torque": torque, "results": wanted, "units": units}
-    table = sweep(design, plan, output=output, callback=callback, title="profile modifications", **given)
+    options: dict[str, Any] = {"results": wanted, "units": units, "output": output, "callback": callback}
+    table = sweep(mesh, torque, design, plan, title="profile modifications", **options)
     theoretical = float(path_of_contact(mesh.pair).contact_ratio + mesh.pair.overlap_ratio)
     if mesh.pair.is_spur:
         shock = table.column("effective_contact_ratio") - theoretical
@@ -226,7 +226,7 @@ def flank_line_contact(
     lengths = _lengths(mesh.pair, kind, None)
     plan, units = _plan([(0.0, 0.0, float(slope), 0.0, *lengths) for slope in deviations])
     design = _Crossed(flank_lines, kind, None, mesh.pair)
-    table = sweep(design, plan, mesh=mesh, torque=torque, results=_results(mesh.pair), units=units)
+    table = sweep(mesh, torque, design, plan, results=_results(mesh.pair), units=units)
     return {name: table.column(name) for name in table.results}
 
 

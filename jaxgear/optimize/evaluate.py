@@ -46,9 +46,9 @@ class _Given(NamedTuple):
 
 @overload
 def evaluate(
-    quantities: One,
     mesh: Mesh,
     torque: Torque,
+    quantities: One,
     *,
     pinion: AbstractModification | None = None,
     wheel: AbstractModification | None = None,
@@ -57,9 +57,9 @@ def evaluate(
 
 @overload
 def evaluate(
-    quantities: Several,
     mesh: Mesh,
     torque: Torque,
+    quantities: Several,
     *,
     pinion: AbstractModification | None = None,
     wheel: AbstractModification | None = None,
@@ -67,9 +67,9 @@ def evaluate(
 
 
 def evaluate(
-    quantities: One | Several,
     mesh: Mesh,
     torque: Torque,
+    quantities: One | Several,
     *,
     pinion: AbstractModification | None = None,
     wheel: AbstractModification | None = None,
@@ -80,12 +80,12 @@ def evaluate(
     quantities are a largest or a smallest value of positions, or both as PPTE is, they are differentiated at the
     positions that decide them alone: value and gradient of PPTE take half the time of those through `solve`.
 
-        slope = jax.grad(lambda amount: evaluate("ppte", mesh, 50.0, pinion=jg.TipRelief(amount, 4.0)))(7.0)
+        slope = jax.grad(lambda amount: evaluate(mesh, 50.0, "ppte", pinion=jg.TipRelief(amount, 4.0)))(7.0)
 
     Args:
-        quantities: name, `Quantity` or function of a mesh cycle; or a list of them.
         mesh: prepared mesh.
         torque: on the pinion [N m], scalar; or an `OperatingPoint`.
+        quantities: name, `Quantity` or function of a mesh cycle; or a list of them.
         pinion: modification of the pinion flank; None for the nominal involute.
         wheel: modification of the wheel flank; None for the nominal involute.
 

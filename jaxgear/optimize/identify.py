@@ -311,11 +311,11 @@ def _further(problem: _Problem, z: Vector, data: Data, size: Scalar, candidate: 
 
 
 def identify(
+    mesh: Mesh,
+    measurement: Measurement,
     design: Design,
     prior: Prior,
-    measurement: Measurement,
     *,
-    mesh: Mesh,
     torque_scale: float | None = 0.01,
     offset: float | None = None,
     single_pitch: Pitches | None = None,
@@ -332,10 +332,10 @@ def identify(
     computer models, J. R. Stat. Soc. B 63, 2001).
 
     Args:
+        mesh: prepared mesh.
+        measurement: measured transmission error.
         design: makes (pinion, wheel) modifications from the named unknowns.
         prior: mean and standard deviation of every unknown in its unit, such as that of the tolerance class.
-        measurement: the data.
-        mesh: prepared mesh.
         torque_scale: standard deviation of the factor between measured and true torque; None for a right one.
         offset: standard deviation of what is added to every reading [um]; None for absolute readings.
         single_pitch: standard deviations of the single pitch deviations of pinion and wheel, see `TeethDeviations`
@@ -355,7 +355,7 @@ def identify(
     whole("steps", steps, low=1)
     for torque in candidates:
         check("candidates", torque, "N m", low=0.0, open_low=True)
-    problem, data = _posed(design, prior, measurement, mesh, torque_scale, offset, single_pitch, model_error)
+    problem, data = _posed(mesh, measurement, design, prior, torque_scale, offset, single_pitch, model_error)
     found = _fit(problem, data, steps)
     z = found.z
     more = [_further(problem, z, data, found.size, jnp.asarray(torque, z.dtype)) for torque in candidates]
@@ -364,10 +364,10 @@ def identify(
 
 
 def _posed(
+    mesh: Mesh,
+    measurement: Measurement,
     design: Design,
     prior: Prior,
-    measurement: Measurement,
-    mesh: Mesh,
     scale: float | None,
     offset: float | None,
     single_pitch: Pitches | None,

@@ -1,12 +1,11 @@
 """The best design in steps that a shop can make, about the optimum of a search."""
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import replace
 from itertools import combinations, product
 
 import numpy as np
 
-from ..numerics import check, real
+from ..numerics import changed, check, real
 from .linear_model import LinearModel
 from .problem import Problem
 from .search import Record
@@ -153,7 +152,7 @@ def _search_free(record: Record, grid: _Grid, polish: Polish) -> None:
         return
     low, high = np.array(problem.low), np.array(problem.high)
     low[grid.columns] = high[grid.columns] = grid.values(grid.cell(record.point))
-    fixed = record.on(replace(problem, low=real(low), high=real(high)))
+    fixed = record.on(changed(problem, low=real(low), high=real(high)))
     fixed.history = []
     polish(fixed.problem, fixed, record.point)
     record.evaluations = fixed.evaluations

@@ -142,10 +142,10 @@ class DesignIdentification(AbstractStudy["IdentificationResult"]):
         stages.begin("searching the variables")
         try:
             found = identify(
+                mesh,
+                self.measurement,
                 _Flanks(self.design.design),
                 self.prior,
-                self.measurement,
-                mesh=mesh,
                 torque_scale=self.torque_scale or None,
                 offset=self.offset or None,
                 single_pitch=self.single_pitch,

@@ -14,7 +14,7 @@ from ..contact.status import WithStatus
 from ..dynamics import Dynamics
 from ..geometry import Gear
 from ..microgeometry import AbstractModification
-from ..numerics import Checked, Given, Numbers, check, maximum, program, quick_jit, real, result, whole
+from ..numerics import Callback, Checked, Given, Numbers, check, maximum, program, quick_jit, real, result, whole
 from .case import Case, Coefficient, case_of, marched, tables
 from .march import BLOCKS_OF_A_PAIR, Depth, March
 from .vibration import LineLoad
@@ -119,7 +119,7 @@ def wear(
     line_load: LineLoad | None = None,
     largest_increment: Given | None = None,
     keep: Callable[[Any, Make], March] | None = None,
-    callback: Callable[[float, float], None] | None = None,
+    callback: Callback | None = None,
 ) -> WearHistory:
     """Wear of both flanks, in blocks of revolutions: contact, wear, new flank, again.
 
@@ -162,7 +162,7 @@ def wear(
             below what the teeth deflect under their load.
         keep: called for every two blocks with all that they depend on and with what makes them; gives them, made now or
             before. None to make them all.
-        callback: called with the revolutions so far and all of them after every two blocks.
+        callback: called as callback(revolutions so far, all of them, None) after every two blocks.
 
     Returns:
         flanks and mesh at the start of every block and after the last one.
@@ -266,7 +266,7 @@ def _by_pairs(case: Case, total: float, blocks: int, limit: float | None, keep, 
         depth = pair.depth[-1]
         found.append(pair)
         if callback is not None:
-            callback(done, total)
+            callback(int(done), int(total), None)
     return history_of(case, _together(found), jnp.asarray(at, depth.dtype))
 
 
