@@ -334,8 +334,8 @@ def test_requests_cover_all_that_a_file_can_say(tmp_path):
     assert request('"latin_hypercube"\nsamples = 60', '"full_factorial"\nlevels = 7').plan.size == 7
     load = request("part_rows = 25", "torques = [25.0, 50.0]\nweights = [3, 1]").load
     assert load.weights.tolist() == [0.75, 0.25]
-    tolerance = request("[sweep]", "[tolerance]\nquality_class = [5, 6]\nsamples = 8\nseed = 2\n[sweep]")
-    assert (tolerance.samples, tolerance.seed) == (8, 2) and tolerance.tolerance.pinion.helix_slope is None
+    gears = request("[sweep]", "[tolerance]\nquality_class = [5, 6]\nsamples = 8\nseed = 2\n[sweep]").manufactured
+    assert (gears.samples, gears.seed) == (8, 2) and gears.tolerance.pinion.helix_slope is None
     assert request("[sweep]", "[sweep]").tolerance is None
 
 
