@@ -31,7 +31,6 @@ from jaxgear.contact.status import Status
 from jaxgear.dynamics.mesh_tables import FILES
 from jaxgear.io import load_design, optimize_request
 from jaxgear.io.folder import RESULT_FILES, result_folder
-from jaxgear.io.optimize_table import METHODS_WITHOUT_VARIABLES
 from jaxgear.manufacture import over_balls
 from jaxgear.metrics import Finding
 from jaxgear.microgeometry import NoModification
@@ -98,11 +97,11 @@ def analyzed(folder):
     """The involute is manufactured as a relief of no height: one program for both designs."""
     made = []  # what was asked for and found, of every design
 
-    def scatter(mesh, torque, *, pinion, wheel, **options):
+    def scatter(mesh, torque, gears, *, pinion, wheel):
         bare = jg.TipRelief(0.0, 5.0)
         pinion, wheel = (bare if isinstance(flank, NoModification) else flank for flank in (pinion, wheel))
-        found = jg.monte_carlo(mesh, torque, pinion=pinion, wheel=wheel, **options)
-        made.append(({"torque": torque, "pinion": pinion, "wheel": wheel, **options}, found))
+        found = jg.monte_carlo(mesh, torque, gears, pinion=pinion, wheel=wheel)
+        made.append(({"torque": torque, "pinion": pinion, "wheel": wheel, "manufactured": gears}, found))
         return found
 
     with pytest.MonkeyPatch.context() as patch:
@@ -191,7 +190,8 @@ def test_designs_of_a_file_with_tolerances_are_manufactured(folder, analyzed):
     file = load_design(folder / "fixed.toml")
     pinion, wheel = file.design({})
     tolerance = jg.Tolerance.from_class(file.pair(), 5).without_lead()
-    wanted = {"torque": 50.0, "pinion": pinion, "wheel": wheel, "tolerance": tolerance, "samples": 8, "seed": 0}
+    gears = jg.ManufacturedGears(tolerance, 8)
+    wanted = {"torque": 50.0, "pinion": pinion, "wheel": wheel, "manufactured": gears}
     asked, scatter = analyzed.made[1]
     assert asked.keys() == wanted.keys() and eqx.tree_equal(asked, wanted)
     found = analyzed.summary["designs"]["modified"]["manufactured"]
@@ -458,8 +458,8 @@ def test_a_quick_run_is_coarse_and_short(folder, tmp_path, monkeypatch):
     class Searched(Exception):
         pass
 
-    def search(design, bounds, **options):
-        asked.update(options, bounds=bounds)
+    def search(problem, **options):
+        asked.update(options, problem=problem)
         raise Searched
 
     monkeypatch.setattr(importlib.import_module("jaxgear.io.optimize_table"), "minimize", search)
@@ -468,10 +468,9 @@ def test_a_quick_run_is_coarse_and_short(folder, tmp_path, monkeypatch):
     path.write_text(FREE.replace("positions = 16", "positions = 4096"))
     with pytest.raises(Searched), jax.numpy_dtype_promotion("standard"), jax.numpy_rank_promotion("allow"):
         main(["optimize", str(path), "--quick", "--no-figures", "-o", str(tmp_path / "out")])
-    assert (
-        asked["method"] == jg.optimize.SLP(starts=4, rounds=1, steps=10) and float(asked["torque"].torques[0]) == 50.0
-    )
-    assert asked["bounds"] == {"height": (0.0, 20.0)} and asked["mesh"].resolution.positions == 16
+    problem = asked["problem"]
+    assert asked["method"] == jg.optimize.SLP(starts=4, rounds=1, steps=10) and float(problem.cases.torque[0]) == 50.0
+    assert problem.bounds == {"height": (0.0, 20.0)} and problem.mesh.resolution.positions == 16
     assert not (tmp_path / "out").exists()
 
 
@@ -536,11 +535,11 @@ def test_what_cannot_be_meshed_is_not_verified(tmp_path, not_searched):
     asked.write_text(thin.replace("starts = 2", "verify = true\nstarts = 2"))
     result = call("optimize", asked, "-o", tmp_path / "asked")
     assert result.code == 2 and "searching" not in result.err and not (tmp_path / "asked").exists()
-    assert "asked.toml: optimize.verify: finite_element_compliance: bore_diameter leaves a rim of" in result.err
+    assert "asked.toml: optimize.verify: bore_diameter leaves a rim of" in result.err
     open_ = tmp_path / "open.toml"
     open_.write_text(thin)
     result = call("optimize", open_, "-m", "te_iteration", "-o", tmp_path / "open", "--no-figures")
-    assert "\nnot verified by finite elements: finite_element_compliance: bore_diameter leaves a rim of" in result.out
+    assert "\nnot verified by finite elements: bore_diameter leaves a rim of" in result.out
     designs = json.loads((tmp_path / "open" / "summary.json").read_text())["designs"]
     assert not any("verified" in design for design in designs.values())
 
@@ -857,7 +856,7 @@ def test_the_program_starts_as_a_process_of_its_own(tmp_path):
 
 
 def test_the_help_knows_every_method():
-    assert app.METHODS == ", ".join((*jg.optimize.METHODS, *METHODS_WITHOUT_VARIABLES))
+    assert app.METHODS == ", ".join(jg.optimize.METHODS)
 
 
 def test_help_and_version_need_no_file():

@@ -850,7 +850,7 @@ results = ["max_flash_temperature"]
 def test_speed_and_friction_reach_objective_constraint_and_sweep(load):
     whole = text(pinion=RELIEF, load="speed = 1000.0\nfriction = 0.05", tail=VARIABLE + FLASH)
     file = load(whole)
-    for spectrum in (optimize_request(file)._common["torque"], sweep_request(file).load):
+    for spectrum in (optimize_request(file)._problem["torque"], sweep_request(file).load):
         assert float(spectrum.speeds[0]) == 1000.0 and float(spectrum.friction) == pytest.approx(0.05)
     # a variable: every variant has its own
     variable = 'n = { low = 500.0, high = 1500.0, unit = "rpm" }\n'
@@ -872,9 +872,7 @@ def test_a_sweep_of_gears_pair_and_load_solves_each_as_the_library_does(load):
     file = load(open_case())
     request = sweep_request(file)
     mesh = file.sweep_mesh(file.resolution(request.highest_torque))
-    table = jg.sweep(
-        file.design, request.plan, mesh=mesh, torque=request.load, results=request.results, units=file.units
-    )
+    table = jg.sweep(mesh, request.load, file.design, request.plan, results=request.results, units=file.units)
     rows = {key: table.column(key) for key in ("x", "a", "t", "mean_te_um", "converged")}
     assert table.units["t"] == "N m" and rows["converged"].all()
     for row in range(8):

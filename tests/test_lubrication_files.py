@@ -149,7 +149,7 @@ def test_what_is_wrong_in_the_file_of_the_oil_names_that_file(load, tmp_path):
 
 def test_a_constraint_and_a_column_need_their_table(load):
     design = load(PAIR + OIL + STRENGTH + RELIEF)
-    (constraint,) = optimize_request(design)._common["constraints"]
+    (constraint,) = optimize_request(design)._problem["constraints"]
     assert constraint.quantity == design.tables["lubricant"].quantity("scuffing_safety")
     assert sweep_request(design).results[2] == design.tables["strength"].quantity("pinion_root_safety")
     for text, message in (

@@ -122,7 +122,7 @@ def test_what_is_refused(written, teeth, message):
 
 def test_names_of_quantities_take_the_table(written):
     search = FREE.replace("[optimize]", '[optimize]\nobjective = "pinion_side_bands"')
-    assert optimize_request(load_design(written(base=search)))._common["objective"].settings.counts == (19, 48)
+    assert optimize_request(load_design(written(base=search)))._problem["objective"].settings.counts == (19, 48)
     base = FIXED.replace("amount = 6.5", 'amount = "height"') + VARIABLES
     sweep = base + '[sweep]\nsamples = 8\nresults = ["total_composite_error"]\n'
     assert sweep_request(load_design(written(base=sweep))).results[0].settings.over == "pinion"

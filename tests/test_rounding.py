@@ -116,7 +116,7 @@ def test_a_rounded_design_keeps_bounds_and_limits_and_searches_what_has_no_step(
 )
 def test_a_step_that_cannot_be_is_refused(steps, said):
     with pytest.raises(ValueError, match=said):
-        check_steps("minimize", steps, {"pinion": (1.0, 20.0), "wheel": (0.0, 20.0)})
+        check_steps(steps, {"pinion": (1.0, 20.0), "wheel": (0.0, 20.0)})
 
 
 FILE = """
@@ -150,7 +150,7 @@ curve = { type = "power", exponent = "exponent" }
 def test_a_design_file_rounds_amounts_and_lengths_unless_it_says_otherwise(tmp_path):
     def steps(text):
         (tmp_path / "pair.toml").write_text(FILE + text, encoding="utf-8")
-        return optimize_request(load_design(tmp_path / "pair.toml"))._common.get("rounding")
+        return optimize_request(load_design(tmp_path / "pair.toml"))._search.get("rounding")
 
     assert steps("") == {"amount": 0.5}  # no multiple of 0.1 mm lies within the bounds of the length
     assert steps("[optimize.rounding]\namount = 0\nlength = 0.01\n") == {"length": 0.01}

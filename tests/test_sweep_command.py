@@ -107,7 +107,7 @@ def test_the_table_is_that_of_the_library(folder):
     )
     file = load_design(folder / "gear.toml")
     plan = sweep_request(file).plan
-    direct = jg.sweep(file.design, plan, mesh=file.mesh(), torque=50.0, results=("ppte", "effective_contact_ratio"))
+    direct = jg.sweep(file.mesh(), 50.0, file.design, plan, results=("ppte", "effective_contact_ratio"))
     np.testing.assert_array_equal(table.column("ppte_um"), direct.column("ppte_um"))
 
 
@@ -147,7 +147,7 @@ def test_repeated_it_finds_everything_there(folder):
     result = sweep(folder / "gear.toml", "-o", folder / "out")
     assert result.code == 0 and "resuming, 60 of 60 variants are complete" in result.err
     assert {path.name: path.stat().st_mtime_ns for path in (folder / "out" / "table").glob("part-*")} == before
-    other = sweep(folder / "gear.toml", "-o", folder / "out", "--samples", "61")
+    other = sweep(folder / "out", "--samples", folder / "gear.toml", "-o")
     assert_refused(other, "table: holds a sweep of other settings (plan, variants)")
 
 
@@ -334,8 +334,8 @@ def test_requests_cover_all_that_a_file_can_say(tmp_path):
     assert request('"latin_hypercube"\nsamples = 60', '"full_factorial"\nlevels = 7').plan.size == 7
     load = request("part_rows = 25", "torques = [25.0, 50.0]\nweights = [3, 1]").load
     assert load.weights.tolist() == [0.75, 0.25]
-    tolerance = request("[sweep]", "[tolerance]\nquality_class = [5, 6]\nsamples = 8\nseed = 2\n[sweep]")
-    assert (tolerance.samples, tolerance.seed) == (8, 2) and tolerance.tolerance.pinion.helix_slope is None
+    gears = request("[sweep]", "[tolerance]\nquality_class = [5, 6]\nsamples = 8\nseed = 2\n[sweep]").manufactured
+    assert (gears.samples, gears.seed) == (8, 2) and gears.tolerance.pinion.helix_slope is None
     assert request("[sweep]", "[sweep]").tolerance is None
 
 

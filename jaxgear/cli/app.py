@@ -21,9 +21,7 @@ from . import interrupt, streams
 from .options import File, NoCache, NoFigures, Quick, Reported, output_option, typed
 
 # of `optimize.METHODS` and of the search for flanks without parameters, as a test makes sure
-METHODS = (
-    "slp, adam, lbfgs, genetic, binary_genetic, cma_es, differential_evolution, factorial, te_iteration, free_form"
-)
+METHODS = "slp, adam, lbfgs, genetic, cma_es, differential_evolution, factorial, te_iteration, free_form"
 
 OK, NOT_CONVERGED, FAILED, INTERRUPTED = 0, 1, 2, 130
 

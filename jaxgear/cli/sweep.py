@@ -45,15 +45,13 @@ def run_sweep(
     options: dict[str, Any] = {} if request.part_rows is None else {"part_rows": request.part_rows}
     with Meter(target) as meter:
         table = sweep(
+            design.sweep_mesh(size),
+            request.load,
             design.design,
             request.plan,
-            mesh=design.sweep_mesh(size),
-            torque=request.load,
             results=request.results,
             output=target / _TABLE,
-            tolerance=request.tolerance,
-            samples=request.samples,
-            seed=request.seed,
+            manufactured=request.manufactured,
             title=design.title,
             units=design.units,
             callback=meter,

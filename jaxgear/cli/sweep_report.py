@@ -15,7 +15,7 @@ from ..microgeometry import NoModification
 from ..report import Chapter, Table, figure, text, write_variants, write_workbook
 from ..studies import side_by_side as report
 from ..studies.comparison import Modifications
-from ..studies.evaluation import evaluate, grid_change, grid_lines, grid_of, torques_of
+from ..studies.evaluation import evaluation_of, grid_change, grid_lines, grid_of, torques_of
 from ..studies.gear_data import gears
 from ..studies.results import save_figures
 from ..studies.summary_data import sizes, versions
@@ -122,7 +122,7 @@ def evaluate_best(
         first = best.take(range(min(CHOSEN, len(best))))
         for number, parameters in reversed([*zip(first.column("variant"), first.designs())]):
             modifications[f"variant {number}"] = design.design(parameters)
-        found = {name: evaluate(design, mesh, torques, *flanks) for name, flanks in modifications.items()}
+        found = {name: evaluation_of(design, mesh, torques, *flanks) for name, flanks in modifications.items()}
         drawn, pages = _draw(folder, design, mesh, found, torques, best) if figures else ([], {})
     findings = report.finding_lines(report.findings(design, mesh, found))
     best_first = {name: found[name] for name in (_UNMODIFIED, *reversed(list(found)))}

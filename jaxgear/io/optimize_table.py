@@ -13,15 +13,14 @@ from ..optimize import (
     Front,
     Optimum,
     Pareto,
-    free_form,
-    iterate_from_low_pressure,
-    iterate_transmission_error,
+    Problem,
     minimize,
     pareto,
 )
 from ..optimize.free_form import CURVES
 from ..optimize.refine import POSITIONS
 from ..optimize.rounding import check_steps, multiples
+from ..tolerance import ManufacturedGears
 from ..vocabulary import quantity_of
 from ..wear import WEAR_QUANTITIES, Wear
 from ..wear.quantities import MOST_LIVES
@@ -49,7 +48,7 @@ from .value_types import (
 )
 
 # They seek the flanks themselves.
-METHODS_WITHOUT_VARIABLES = ("te_iteration", "free_form")
+METHODS_WITHOUT_VARIABLES = tuple(name for name, cls in METHODS.items() if not cls.takes_variables)
 CURVE = "cubic"  # on which flanks without parameters are projected
 PARETO = "pareto"
 
@@ -87,7 +86,7 @@ class IterationOptions(FileTable):
         curve: name of the curve that the flanks are projected on, such as "power"; "cubic" without it.
     """
 
-    source = iterate_transmission_error
+    source = METHODS["te_iteration"]
 
     start: str = entry(choice("unmodified", "given", "low_pressure"), "unmodified")
     max_relief: float = entry(positive("um"), 7.0)
@@ -104,7 +103,7 @@ class FreeFormOptions(FileTable):
         curve: name of the curve that the flanks are projected on, such as "power"; "cubic" without it.
     """
 
-    source = free_form
+    source = METHODS["free_form"]
 
     points: int | None = entry(count(4, 500))
     max_relief: float | None = entry(positive("um"))
@@ -115,7 +114,8 @@ class FreeFormOptions(FileTable):
 
 def method_options() -> dict[str, type[FileTable]]:
     """The tables [optimize.<method>] of the methods that have one, of a user's own too: the fields of their classes."""
-    found = {name: section_of(cls, ("starts", "steps", "seed"), open=False) for name, cls in METHODS.items()}
+    shared, others = ("starts", "steps", "seed"), METHODS_WITHOUT_VARIABLES
+    found = {name: section_of(cls, shared, open=False) for name, cls in METHODS.items() if name not in others}
     found |= {"factorial": FactorialOptions, PARETO: section_of(Pareto)}
     found |= {"te_iteration": IterationOptions, "free_form": FreeFormOptions}
     return {name: section for name, section in found.items() if section.keys}
@@ -220,7 +220,12 @@ def optimize_of(design: DesignFile) -> OptimizeSection:
 
 def _check_method(name: str) -> None:
     """Refuses a name that is no method."""
-    check_known("optimize.method", name, (*METHODS, PARETO, *METHODS_WITHOUT_VARIABLES))
+    check_known("optimize.method", name, (*METHODS, PARETO))
+
+
+def _varies(name: str) -> bool:
+    """Whether a method seeks the best values of the variables of a file."""
+    return name in METHODS and METHODS[name].takes_variables
 
 
 def _made_by(name: str) -> type[Any]:
@@ -244,7 +249,7 @@ def _options_of(section: OptimizeSection, name: str, *, of_the_file: bool) -> di
     """The options of a method; the file may name others where it is not the file that asks for the method."""
     options = section.options(name)
     shared = {"starts": section.starts, "steps": section.steps, "seed": section.seed or 0}
-    taken = {field.name for field in dataclasses.fields(METHODS[name])} if name in METHODS else set()
+    taken = {field.name for field in dataclasses.fields(METHODS[name])} if _varies(name) else set()
     if of_the_file:
         why = f' with method "{name}"'
         section.refuse([key for key in ("starts", "steps") if key not in taken], why)
@@ -268,7 +273,6 @@ _QUICK: Mapping[str, dict[str, Any]] = {
     "adam": {"starts": 4, "steps": 40},
     "lbfgs": {"starts": 4, "steps": 30},
     "genetic": {"population": 20, "generations": 10},
-    "binary_genetic": {"population": 20, "generations": 10},
     "cma_es": {"population": 8, "generations": 20},
     "differential_evolution": {"population": 20, "generations": 10},
     "factorial": {"levels": 3},
@@ -293,12 +297,14 @@ class OptimizeRequest:
     curve: str | None
     verify: bool | None
     _design: DesignFile
-    _common: dict[str, Any]  # what its function takes besides design, mesh and callback
+    _problem: dict[str, Any]  # arguments of `Problem` besides the mesh
+    _search: dict[str, Any]  # arguments of `minimize` or `pareto` besides the callback
 
     @property
     def finer(self) -> int | None:
         """Positions of the finer mesh on which it ends; None where it stays on its mesh or chooses later."""
-        return self._common.get("positions", POSITIONS) if self.method in (*METHODS, PARETO) else None
+        ends_on_finer = _varies(self.method) or self.method == PARETO
+        return self._search.get("positions", POSITIONS) if ends_on_finer else None
 
     def over_life(self, settings: Wear) -> "OptimizeRequest | None":
         """The search of the same variables for the least mean PPTE over the life at the design torque.
@@ -306,32 +312,21 @@ class OptimizeRequest:
         One gradient search without rounding, since every step of it wears a life. None where flanks are sought without
         variables, and where the file asks for a quantity of worn flanks itself.
         """
-        asked = self._common.get("objective", "ppte")
-        if self.method not in METHODS or (isinstance(asked, Quantity) and asked.name in WEAR_QUANTITIES):
+        asked = self._problem.get("objective", "ppte")
+        if not _varies(self.method) or (isinstance(asked, Quantity) and asked.name in WEAR_QUANTITIES):
             return None
-        kept = {name: value for name, value in self._common.items() if name in ("constraints", "seed")}
-        kept |= {"torque": self._design.spectrum(OptimizeSection("optimize")), "positions": None}
-        kept |= {"objective": settings.quantity(_LASTING), "method": METHODS[_DEFAULT_METHOD](**_OVER_LIFE)}
-        return dataclasses.replace(self, method=_DEFAULT_METHOD, _common=kept)
+        kept = {name: self._problem[name] for name in ("design", "bounds", "constraints")}
+        kept |= {"torque": self._design.spectrum(OptimizeSection("optimize"))}
+        kept |= {"objective": settings.quantity(_LASTING)}
+        search = {"method": METHODS[_DEFAULT_METHOD](**_OVER_LIFE), "positions": None}
+        return dataclasses.replace(self, method=_DEFAULT_METHOD, _problem=kept, _search=search)
 
     def __call__(self, mesh: Mesh, callback: Callback | None = None) -> Optimum | Front:
         """Runs it on a prepared mesh."""
-        design = self._design
-        if self.method == "free_form":
-            return free_form(mesh, callback=callback, **self._common)
-        if self.method == "te_iteration":
-            return self._iterate(mesh, callback)
+        problem = Problem(mesh, **self._problem)
         if self.method == PARETO:
-            return pareto(design.design, design.bounds, mesh=mesh, callback=callback, **self._common)
-        return minimize(design.design, design.bounds, mesh=mesh, callback=callback, **self._common)
-
-    def _iterate(self, mesh: Mesh, callback: Callback | None) -> Optimum:
-        design, options = self._design, {"callback": callback, **self._common}
-        start, torque = options.pop("start"), design.torque
-        if start == "low_pressure":
-            return iterate_from_low_pressure(design.design, design.bounds, mesh=mesh, torque=torque, **options)
-        pinion, wheel = design.design({}) if start == "given" else (None, None)
-        return iterate_transmission_error(mesh, torque, pinion=pinion, wheel=wheel, **options)
+            return pareto(problem, callback=callback, **self._search)
+        return minimize(problem, callback=callback, **self._search)
 
 
 def optimize_request(design: DesignFile, *, method: str | None = None, quick: bool = False) -> OptimizeRequest:
@@ -362,38 +357,38 @@ def _request(design: DesignFile, method: str | None, quick: bool) -> OptimizeReq
     _check_options(design, name, options)
     curve = options.pop("curve", CURVE) if flanks_alone else None
     verify = False if quick else section.verify
-    common = _common(design, section, name, quick)
-    fewer = _QUICK.get(name, {}) if quick else {}
+    problem = {"torque": design.spectrum(section), **_goals(design, section, name, quick)}
+    varies = name != "free_form"
     if name == "te_iteration":
         _check_iteration(design, options["start"], section)
         if options["start"] == "low_pressure":
-            options["method"] = METHODS[_DEFAULT_METHOD](**(_QUICK[_DEFAULT_METHOD] if quick else {}))
-        common = options
-    elif name == "free_form":
-        common |= options | fewer
-    else:
-        common["method"] = _made_by(name)(**options | fewer)
-    if name in METHODS:
-        common["rounding"] = _rounding(design, section)
+            options["search"] = METHODS[_DEFAULT_METHOD](**(_QUICK[_DEFAULT_METHOD] if quick else {}))
+        varies = options["start"] != "unmodified"
+    if varies:
+        problem |= {"design": design.design, "bounds": design.bounds}
+    fewer = _QUICK.get(name, {}) if quick else {}
+    search: dict[str, Any] = {"method": _made_by(name)(**options | fewer)}
+    if _varies(name):
+        search["rounding"] = _rounding(design, section)
     elif method is None:
         section.refuse(["rounding"], f' with method "{name}"')
     if quick:  # a quick look stays on its mesh
-        common["positions"] = None
-    return OptimizeRequest(name, curve, verify, design, common)
+        search["positions"] = None
+    return OptimizeRequest(name, curve, verify, design, problem, search)
 
 
-def _common(design: DesignFile, section: OptimizeSection, name: str, quick: bool) -> dict[str, Any]:
-    """Objective, cases and constraints."""
+def _goals(design: DesignFile, section: OptimizeSection, name: str, quick: bool) -> dict[str, Any]:
+    """Objective, measure, constraints and manufactured gears."""
     found: dict[str, Any] = {
-        **_objective(design, section, name),
-        "torque": design.spectrum(section),
+        "objective": _objective(design, section, name),
         "measure": _measure(section),
         "constraints": _constraints(design, section),
-        "seed": section.seed or 0,
     }
     if section.manufactured is not None:
-        found["tolerance"] = tolerance_of(design)
-        found["samples"] = min(section.manufactured, _QUICK_GEARS) if quick else section.manufactured
+        pairs = min(section.manufactured, _QUICK_GEARS) if quick else section.manufactured
+        tolerance = tolerance_of(design)
+        assert tolerance is not None  # by `check_beside`
+        found["manufactured"] = ManufacturedGears(tolerance, pairs, section.seed or 0)
     return found
 
 
@@ -405,17 +400,15 @@ def _objectives(
     return tuple(quantity_named(design, "optimize.objective", each) for each in named)
 
 
-def _objective(design: DesignFile, section: OptimizeSection, name: str) -> dict[str, Any]:
-    """Keyword arguments of a method for its objective; empty for a method with a fixed objective."""
+def _objective(design: DesignFile, section: OptimizeSection, name: str) -> str | Quantity | tuple[str | Quantity, ...]:
+    """The objective of a method, or several."""
     objectives = _objectives(design, section, _FRONT if name == PARETO else ("ppte",))
     if (len(objectives) > 1) != (name == PARETO):
         problem = f'{len(objectives)} with method "{name}": method "pareto" takes several, the others take one'
         raise DesignFileError("optimize.objective", problem)
-    if name in METHODS_WITHOUT_VARIABLES:
-        if objectives != ("ppte",):
-            raise DesignFileError("optimize.objective", f'must be "ppte" with method "{name}"')
-        return {}
-    return {"objectives": objectives} if name == PARETO else {"objective": objectives[0]}
+    if name in METHODS_WITHOUT_VARIABLES and objectives != ("ppte",):
+        raise DesignFileError("optimize.objective", f'must be "ppte" with method "{name}"')
+    return objectives if name == PARETO else objectives[0]
 
 
 def _measure(section: OptimizeSection) -> AbstractMeasure:
@@ -441,7 +434,7 @@ def _constraint(design: DesignFile, section: ConstraintSection) -> Constraint:
     if isinstance(of, str):
         of = quantity_named(design, f"{key}.of", of)
         _check_reachable(design, f"{key}.low", of, section.low)
-        unit = quantity_of(of, key).unit
+        unit = quantity_of(of).unit
     else:
         for name in of:
             if name not in design.bounds:
@@ -468,7 +461,7 @@ def _rounding(design: DesignFile, section: OptimizeSection) -> dict[str, float]:
         if name not in design.bounds:
             problem = f'"{name}" is not a variable, {suggestion(name, design.bounds)}'
             raise DesignFileError(f"{asked.at}.variables", problem)
-    return refused(asked.at, check_steps, "optimize", {**steps, **(asked.variables or {})}, design.bounds)
+    return refused(asked.at, check_steps, {**steps, **(asked.variables or {})}, design.bounds)
 
 
 def _check_reachable(design: DesignFile, key: str, of: str | Quantity, low: float | None) -> None:

@@ -10,14 +10,14 @@ from ..conditions import LoadSpectrum
 from ..contact import OperatingPoint
 from ..metrics import Quantity
 from ..sweeps import AbstractPlan, FullFactorial, LatinHypercube, Sobol
-from ..tolerance import Tolerance
+from ..tolerance import ManufacturedGears
 from .design_file import DesignFile
 from .errors import DesignFileError, naming, referring, refused
 from .named_quantities import quantity_named
 from .rows import read_variants
 from .table_keys import entry
 from .tables import FurtherTable, Rest
-from .tolerance_table import tolerance_of
+from .tolerance_table import manufactured_of
 from .value_types import LEVEL, SEED, WEIGHTS, choice, count, either, list_of, positive, real, table, text
 
 # The keys that a kind of sampling takes, the first of which it needs; what another kind takes has no effect and is
@@ -91,8 +91,7 @@ class SweepRequest:
         highest_torque: that a variant can have [N m].
         results: names of results, or quantities.
         part_rows: variants per file of the table, None for the library's default.
-        tolerance: of the gears, None where the file has none.
-        samples, seed: of the tolerance's deviations.
+        manufactured: manufactured gears, None where the file has no tolerances.
     """
 
     plan: AbstractPlan
@@ -100,9 +99,7 @@ class SweepRequest:
     highest_torque: float
     results: tuple[str | Quantity, ...]
     part_rows: int | None
-    tolerance: Tolerance | None
-    samples: int | None
-    seed: int
+    manufactured: ManufacturedGears | None
 
 
 def sweep_request(design: DesignFile, *, samples: int | None = None, most: int | None = None) -> SweepRequest:
@@ -130,7 +127,6 @@ def _request(design: DesignFile, samples: int | None, most: int | None) -> Sweep
     if most is not None and section.samples is not None:
         section = section.changed(samples=min(section.samples, most))
     results = _results(design, section)
-    tolerance = design.tables.get("tolerance")
     load, highest = _load(design, section)
     return SweepRequest(
         plan=_plan(design, section),
@@ -138,9 +134,7 @@ def _request(design: DesignFile, samples: int | None, most: int | None) -> Sweep
         highest_torque=highest,
         results=results,
         part_rows=section.part_rows,
-        tolerance=tolerance_of(design),
-        samples=None if tolerance is None else tolerance.samples,
-        seed=0 if tolerance is None else tolerance.seed,
+        manufactured=manufactured_of(design),
     )
 
 

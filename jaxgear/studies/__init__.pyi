@@ -10,7 +10,7 @@ from .design_analysis import DesignAnalysis as DesignAnalysis
 from .dynamics import DynamicsStudy as DynamicsStudy
 from .dynamics_result import DynamicsResult as DynamicsResult
 from .evaluation import Evaluation as Evaluation
-from .evaluation import evaluate as evaluate
+from .evaluation import evaluation_of as evaluation_of
 from .export import ExportResult as ExportResult
 from .export import ExportStudy as ExportStudy
 from .layout import LayoutStudy as LayoutStudy

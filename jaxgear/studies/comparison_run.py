@@ -21,11 +21,11 @@ from ..optimize import (
     structure_for,
     verification,
 )
-from ..tolerance import Tolerance
+from ..tolerance import ManufacturedGears
 from . import manufactured, side_by_side
 from .comparison import Modifications
 from .comparison_result import ComparisonResult
-from .evaluation import Evaluation, coarse, evaluate, torques_of
+from .evaluation import Evaluation, coarse, evaluation_of, torques_of
 from .optimum_report import COMPROMISE
 from .progress import Stages
 
@@ -85,7 +85,7 @@ class ComparisonRun:
     def evaluate(self, name: str, pinion: AbstractModification, wheel: AbstractModification) -> None:
         """Evaluates a design and keeps it."""
         self._stages.begin(f"solving the {name} design")
-        found = evaluate(self.design, self._mesh, self._torques, pinion, wheel)
+        found = evaluation_of(self.design, self._mesh, self._torques, pinion, wheel)
         if self._problem is not None:
             found = dataclasses.replace(found, objectives=judged(self._problem, pinion, wheel))
         self._evaluations[name] = found
@@ -126,13 +126,13 @@ class ComparisonRun:
             found = by_finite_elements(claimed.cycle, claimed.objectives, claimed.pinion, claimed.wheel)
             self._evaluations[name] = dataclasses.replace(claimed, verified=found)
 
-    def result(self, tolerance: Tolerance | None) -> ComparisonResult:
-        """Result of the comparison, with the scatter of all designs within a tolerance; None for nominal gears only."""
+    def result(self, gears: ManufacturedGears | None) -> ComparisonResult:
+        """Result of the comparison, with the scatter of all designs; None for nominal gears only."""
         evaluations = self._evaluations
-        if tolerance is not None:
+        if gears is not None:
             self._stages.begin("manufacturing the designs within their tolerances")
             of = self.design, self._mesh, evaluations
-            evaluations = manufactured.scattered(*of, tolerance, quick=self._quick)
+            evaluations = manufactured.scattered(*of, gears)
         return ComparisonResult(
             self.design,
             self._quick,

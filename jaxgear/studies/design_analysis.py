@@ -5,12 +5,12 @@ from typing import ClassVar, Self
 
 from ..io import DesignFile, DesignFileError
 from ..io.errors import naming
-from ..io.tolerance_table import tolerance_of
 from ..microgeometry import NoModification
-from ..tolerance import Tolerance
+from ..tolerance import ManufacturedGears
 from .checkpoints import Checkpoints
 from .comparison_result import ComparisonResult
 from .comparison_run import ComparisonRun
+from .manufactured import gears_of
 from .progress import Stages
 from .study import AbstractStudy
 
@@ -20,14 +20,14 @@ class DesignAnalysis(AbstractStudy[ComparisonResult]):
     """Analyze the unmodified pair and the modification of the design file.
 
     Attributes:
-        tolerance: of manufactured gears; None without the table [tolerance].
+        manufactured: manufactured gears; None without the table [tolerance].
     """
 
     name: ClassVar = "analyze"
     takes_coast: ClassVar = True
     coarse: ClassVar = ""
 
-    tolerance: Tolerance | None
+    manufactured: ManufacturedGears | None
 
     @classmethod
     def of(cls, design: DesignFile, *, quick: bool = False) -> Self:
@@ -38,7 +38,7 @@ class DesignAnalysis(AbstractStudy[ComparisonResult]):
             problem = f"analyze needs numbers, these are free: {', '.join(free)}; {says}"
             raise DesignFileError("variables", problem, design.path)
         with naming(design.path):
-            return cls(design, quick, tolerance_of(design))
+            return cls(design, quick, gears_of(design, quick=quick))
 
     def omits(self) -> str:
         """Nothing."""
@@ -52,4 +52,4 @@ class DesignAnalysis(AbstractStudy[ComparisonResult]):
         pinion, wheel = self.design.design(self.design.values)
         if not (isinstance(pinion, NoModification) and isinstance(wheel, NoModification)):
             run.evaluate("modified", pinion, wheel)
-        return run.result(self.tolerance)
+        return run.result(self.manufactured)

@@ -17,8 +17,8 @@ from ..layout import (
     at_stations,
     at_torque,
     face_load_over_torques,
-    findings_of,
     flank_line_contact,
+    layout_findings,
     layout_flank_lines,
     vary_profiles,
 )
@@ -99,7 +99,7 @@ class LayoutStudy(AbstractStudy[LayoutResult]):
                 slices_change = {which: face_change(cycle, between[which]) for which, cycle in cycles.items()}
         duty_cycle = request.options.get("duty_cycle")
         unusual = {
-            name: findings_of(
+            name: layout_findings(
                 layout,
                 request.supports[name],
                 duty_cycle=duty_cycle,

@@ -5,13 +5,13 @@ from typing import ClassVar, Self
 
 from ..io import DesignFile, OptimizeRequest, optimize_request
 from ..io.errors import naming
-from ..io.tolerance_table import tolerance_of
 from ..microgeometry import NoModification
-from ..tolerance import Tolerance
+from ..tolerance import ManufacturedGears
 from .checkpoints import Checkpoints
 from .comparison import rule_based
 from .comparison_result import ComparisonResult
 from .comparison_run import ComparisonRun
+from .manufactured import gears_of
 from .progress import Stages
 from .study import AbstractStudy
 
@@ -24,7 +24,7 @@ class DesignOptimization(AbstractStudy[ComparisonResult]):
 
     Attributes:
         request: what the file asks for.
-        tolerance: of manufactured gears; None without the table [tolerance].
+        manufactured: manufactured gears; None without the table [tolerance].
     """
 
     name: ClassVar = "optimize"
@@ -33,14 +33,14 @@ class DesignOptimization(AbstractStudy[ComparisonResult]):
     needs: ClassVar = ("scipy.optimize",)
 
     request: OptimizeRequest
-    tolerance: Tolerance | None
+    manufactured: ManufacturedGears | None
 
     @classmethod
     def of(cls, design: DesignFile, *, quick: bool = False, method: str | None = None) -> Self:
         """Optimization of a design file, see `AbstractStudy.of`; `method` replaces that of the file."""
         request = optimize_request(design, method=method, quick=quick)
         with naming(design.path):
-            return cls(design, quick, request, tolerance_of(design))
+            return cls(design, quick, request, gears_of(design, quick=quick))
 
     @property
     def folder(self) -> str:
@@ -57,4 +57,4 @@ class DesignOptimization(AbstractStudy[ComparisonResult]):
         run.prepare(finer=self.request.finer, verify=self.request.verify)
         relief, involute = rule_based(self.design), NoModification()
         run.search(self.request, {"unmodified": (involute, involute), "rule-based": (relief, relief)})
-        return run.result(self.tolerance)
+        return run.result(self.manufactured)

@@ -8,9 +8,8 @@ from typing import Any, ClassVar, Self
 from ..contact import Mesh, OperatingPoint
 from ..io import DesignFile, OptimizeRequest, WearRequest, wear_request
 from ..io.errors import naming
-from ..io.tolerance_table import tolerance_of
 from ..numerics import optional_real, real
-from ..tolerance import Tolerance
+from ..tolerance import ManufacturedGears
 from ..wear import WearHistory, wear
 from . import manufactured, wear_scatter
 from .checkpoints import Checkpoints, CheckpointsOfKind, Marches, NamedArrays
@@ -42,7 +41,7 @@ class WearStudy(AbstractStudy[WearResult]):
     request: WearRequest
     search: OptimizeRequest | None
     over_life: OptimizeRequest | None
-    tolerance: Tolerance | None
+    gears: ManufacturedGears | None
 
     @classmethod
     def of(cls, design: DesignFile, *, quick: bool = False) -> Self:
@@ -53,8 +52,8 @@ class WearStudy(AbstractStudy[WearResult]):
         static = dataclasses.replace(request.settings, line_load=None, dynamics=None)
         over_life = None if search is None else search.over_life(static)
         with naming(design.path):
-            tolerance = None if wear_scatter.left_out(design) else tolerance_of(design)
-        return cls(design, quick, request, search, over_life, tolerance)
+            gears = None if wear_scatter.left_out(design) else manufactured.gears_of(design, quick=quick)
+        return cls(design, quick, request, search, over_life, gears)
 
     def omits(self) -> str:
         """Manufactured gears under the dynamic line load."""
@@ -72,19 +71,13 @@ class WearStudy(AbstractStudy[WearResult]):
         kept = checkpoints.of(Marches())
         histories = {name: self._life(mesh, name, flanks, kept, stages) for name, flanks in designs.items()}
         scatters: Mapping[str, wear_scatter.Samples] = {}
-        if self.tolerance is not None:
+        if self.gears is not None:
             stages.begin("wear of manufactured gears of all designs")
             # of one length, as quantities take them, and as many as the nominal gears have taken
             blocks = min(max(len(history.revolutions) - 1 for history in histories.values()), _MOST_BLOCKS)
             settings = dataclasses.replace(self.request.settings, blocks=blocks)
             scatters = wear_scatter.manufactured_wear(
-                settings,
-                mesh,
-                design.torque,
-                designs,
-                self.tolerance,
-                **manufactured.drawn(design, quick=quick),
-                keep=checkpoints.of(NamedArrays()),
+                mesh, design.torque, designs, settings, self.gears, keep=checkpoints.of(NamedArrays())
             )
         return WearResult(design, self.request, designs, histories, scatters)
 
@@ -95,8 +88,8 @@ class WearStudy(AbstractStudy[WearResult]):
         stages.begin(f"wear of the {name} design")
         design, settings, (pinion, wheel) = self.design, self.request.settings, flanks
 
-        def progress(done: float, total: float) -> None:
-            stages.count(int(done), int(total), f"{done:.3g} of {total:.3g} revolutions")
+        def progress(done: int, total: int, best: float | None) -> None:
+            stages.count(done, total, f"{done:.3g} of {total:.3g} revolutions")
 
         return wear(
             mesh,

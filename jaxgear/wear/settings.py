@@ -62,8 +62,8 @@ class Wear(AbstractSettings):
     loads: LoadSpectrum | None = None
 
     def check_together(self) -> None:
-        check_blocks("Wear", self.blocks)
-        check_line_load("Wear", self.line_load, self.dynamics)
+        check_blocks(self.blocks)
+        check_line_load(self.line_load, self.dynamics)
 
     @property
     def coefficients(self) -> Float[Array, " gears"]:
