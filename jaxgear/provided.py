@@ -1,10 +1,11 @@
 """Studies, commands and formats of installed packages, by their entry points."""
 
+from pathlib import Path
 from typing import Any
 
 
 def provided(group: str) -> dict[str, Any]:
-    """Entry points by their names.
+    """Entry points by their names; without those of folders that have been deleted from this package.
 
     Args:
         group: "studies", "commands" or "formats", in `pyproject.toml` the table
@@ -14,4 +15,9 @@ def provided(group: str) -> dict[str, Any]:
     """
     from importlib import metadata  # imported when asked for: it takes longer than the commands need
 
-    return {entry.name: entry for entry in metadata.entry_points(group=f"jaxgear.{group}")}
+    return {entry.name: entry for entry in metadata.entry_points(group=f"jaxgear.{group}") if not _deleted(entry.value)}
+
+
+def _deleted(place: str) -> bool:
+    package, *folders = place.partition(":")[0].split(".")
+    return package == __package__ and not Path(__file__).parent.joinpath(*folders[:1]).exists()
