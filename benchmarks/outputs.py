@@ -141,8 +141,8 @@ def _values(folder: Path) -> Iterator[tuple[str, Any]]:
     """Numbers and texts of all files of a folder by file and key."""
     for path in sorted(folder.rglob("*")):
         if path.suffix in _COMPARED and not any(part.startswith(".") for part in path.relative_to(folder).parts):
-            for key, value in _of_file(path):
-                yield f"{path.relative_to(folder)}: {key}", value
+            name = re.sub(r"-[0-9a-f]{16}(?=\.parquet)", "", str(path.relative_to(folder)))  # a digest of the code too
+            yield from ((f"{name}: {key}", value) for key, value in _of_file(path))
 
 
 def _of_file(path: Path) -> Iterator[tuple[str, Any]]:
