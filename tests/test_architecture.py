@@ -101,7 +101,7 @@ HEAVY = {
     "jaxgear.plot",
 }
 # so do the commands, and their help without any of the library
-_NAMES = "convert", "devices", "new", "run", "sweep"
+_NAMES = "convert", "devices", "new", "run"
 COMMANDS = {f"jaxgear.cli.{name}" for name in _NAMES}
 
 
@@ -283,7 +283,7 @@ def test_import_is_silent_and_changes_nothing():
         "        getattr(jaxgear, name)\n"
         "assert not {'matplotlib', 'optax', 'typer', 'pyarrow', 'evosax'} & set(sys.modules)\n"
         "assert dict(jax.config.values) == before\n"
-        "import jaxgear.cli.run, jaxgear.cli.sweep\n"
+        "import jaxgear.cli.run\n"
         "jax.config.update('jax_num_cpu_devices', 3)\n"  # nothing has chosen the devices either
         "jax.config.update('jax_enable_x64', True)\n"
         "assert jax.device_count() == 3\n"

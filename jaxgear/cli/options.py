@@ -26,8 +26,3 @@ Quick = Annotated[
 Reported = Annotated[
     bool, typer.Option("--report", help="Write report.html too, a self-contained file (needs jaxgear\\[report]).")
 ]
-
-
-def typed(context: typer.Context, wanted: bool) -> list[str] | None:
-    """Arguments of the command line if a report is wanted, else None."""
-    return list(context.obj) if wanted else None

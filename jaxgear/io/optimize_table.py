@@ -2,7 +2,7 @@
 
 import dataclasses
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import Any, Self
 
 from ..contact import Mesh
 from ..metrics import Quantity
@@ -191,7 +191,7 @@ class OptimizeSection(FurtherTable):
 
     def check(self, design: DesignFile) -> None:
         """As a search does, whatever method the command line asks for."""
-        _check_method(self.method or _DEFAULT_METHOD)
+        check_known("optimize.method", self.method or _DEFAULT_METHOD, known_methods())
         for name in method_options():
             if self.given().get(name) is not None:
                 _check_options(design, name, self.options(name))
@@ -218,9 +218,9 @@ def optimize_of(design: DesignFile) -> OptimizeSection:
     return design.tables.get("optimize") or OptimizeSection("optimize")
 
 
-def _check_method(name: str) -> None:
-    """Refuses a name that is no method."""
-    check_known("optimize.method", name, (*METHODS, PARETO, *METHODS_WITHOUT_VARIABLES))
+def known_methods() -> tuple[str, ...]:
+    """Names of all methods."""
+    return (*METHODS, PARETO, *METHODS_WITHOUT_VARIABLES)
 
 
 def _made_by(name: str) -> type[Any]:
@@ -280,53 +280,74 @@ _LASTING, _OVER_LIFE = "mean_ppte_over_life", {"starts": 4, "rounds": 1, "steps"
 
 
 @dataclasses.dataclass(frozen=True)
-class OptimizeRequest:
-    """An optimization, checked; call it to run it.
+class Search:
+    """The search that a design file asks for; call it to run it.
 
     Attributes:
+        design: the design file.
         method: its name.
+        options: arguments of the function of the method, besides design, mesh and callback.
         curve: named curve on which the flanks of a method without parameters are projected; None for the others.
-        verify: whether the designs are to be evaluated with the finite-element structure too; None where that goes.
+        verify: True if the designs are to be evaluated with the finite-element structure too; None where the gears can
+            be meshed.
     """
 
+    design: DesignFile
     method: str
-    curve: str | None
-    verify: bool | None
-    _design: DesignFile
-    _common: dict[str, Any]  # what its function takes besides design, mesh and callback
+    options: Mapping[str, Any]
+    curve: str | None = None
+    verify: bool | None = None
+
+    @classmethod
+    def of(cls, design: DesignFile, *, method: str | None = None, quick: bool = False) -> Self:
+        """The search, checked.
+
+        Args:
+            design: the design file.
+            method: method in place of that of the file.
+            quick: few starts, steps and designs, for a first look.
+
+        Raises:
+            DesignFileError: for anything that is wrong with it, in one line that names the file and the key.
+        """
+        section = optimize_of(design)
+        name = method or section.method or _DEFAULT_METHOD
+        with naming(design.path):
+            options, curve = _arguments(design, section, name, of_the_file=method is None, quick=quick)
+        return cls(design, name, options, curve, False if quick else section.verify)
 
     @property
     def finer(self) -> int | None:
         """Positions of the finer mesh on which it ends; None where it stays on its mesh or chooses later."""
-        return self._common.get("positions", POSITIONS) if self.method in (*METHODS, PARETO) else None
+        return self.options.get("positions", POSITIONS) if self.method in (*METHODS, PARETO) else None
 
-    def over_life(self, settings: Wear) -> "OptimizeRequest | None":
+    def over_life(self, settings: Wear) -> "Search | None":
         """The search of the same variables for the least mean PPTE over the life at the design torque.
 
         One gradient search without rounding, since every step of it wears a life. None where flanks are sought without
         variables, and where the file asks for a quantity of worn flanks itself.
         """
-        asked = self._common.get("objective", "ppte")
+        asked = self.options.get("objective", "ppte")
         if self.method not in METHODS or (isinstance(asked, Quantity) and asked.name in WEAR_QUANTITIES):
             return None
-        kept = {name: value for name, value in self._common.items() if name in ("constraints", "seed")}
-        kept |= {"torque": self._design.spectrum(OptimizeSection("optimize")), "positions": None}
+        kept = {name: value for name, value in self.options.items() if name in ("constraints", "seed")}
+        kept |= {"torque": self.design.spectrum(OptimizeSection("optimize")), "positions": None}
         kept |= {"objective": settings.quantity(_LASTING), "method": METHODS[_DEFAULT_METHOD](**_OVER_LIFE)}
-        return dataclasses.replace(self, method=_DEFAULT_METHOD, _common=kept)
+        return dataclasses.replace(self, method=_DEFAULT_METHOD, options=kept)
 
     def __call__(self, mesh: Mesh, callback: Callback | None = None) -> Optimum | Front:
         """Runs it on a prepared mesh."""
-        design = self._design
+        design = self.design
         if self.method == "free_form":
-            return free_form(mesh, callback=callback, **self._common)
+            return free_form(mesh, callback=callback, **self.options)
         if self.method == "te_iteration":
             return self._iterate(mesh, callback)
         if self.method == PARETO:
-            return pareto(design.design, design.bounds, mesh=mesh, callback=callback, **self._common)
-        return minimize(design.design, design.bounds, mesh=mesh, callback=callback, **self._common)
+            return pareto(design.design, design.bounds, mesh=mesh, callback=callback, **self.options)
+        return minimize(design.design, design.bounds, mesh=mesh, callback=callback, **self.options)
 
     def _iterate(self, mesh: Mesh, callback: Callback | None) -> Optimum:
-        design, options = self._design, {"callback": callback, **self._common}
+        design, options = self.design, {"callback": callback, **self.options}
         start, torque = options.pop("start"), design.torque
         if start == "low_pressure":
             return iterate_from_low_pressure(design.design, design.bounds, mesh=mesh, torque=torque, **options)
@@ -334,34 +355,19 @@ class OptimizeRequest:
         return iterate_transmission_error(mesh, torque, pinion=pinion, wheel=wheel, **options)
 
 
-def optimize_request(design: DesignFile, *, method: str | None = None, quick: bool = False) -> OptimizeRequest:
-    """Checks what a design file says about an optimization.
-
-    Args:
-        design: the design file.
-        method: in place of the file's.
-        quick: few starts, steps and designs, for a first look.
-
-    Raises:
-        DesignFileError: for anything that is wrong with it, in one line that names the file and the key.
-    """
-    with naming(design.path):
-        return _request(design, method, quick)
-
-
-def _request(design: DesignFile, method: str | None, quick: bool) -> OptimizeRequest:
-    section = optimize_of(design)
-    name = method or section.method or _DEFAULT_METHOD
+def _arguments(
+    design: DesignFile, section: OptimizeSection, name: str, *, of_the_file: bool, quick: bool
+) -> tuple[dict[str, Any], str | None]:
+    """Arguments of the function of a method, and the curve of flanks without parameters."""
     flanks_alone = name in METHODS_WITHOUT_VARIABLES
-    _check_method(name)
+    check_known("optimize.method", name, known_methods())
     if not design.bounds and not flanks_alone:
         raise DesignFileError("variables", "missing, nothing to optimize; use jaxgear analyze")
     for free in design.open_case:
         raise DesignFileError(free.key, f'"{free.name}" is a variable, which a sweep alone can vary here')
-    options = _options_of(section, name, of_the_file=method is None)
+    options = _options_of(section, name, of_the_file=of_the_file)
     _check_options(design, name, options)
     curve = options.pop("curve", CURVE) if flanks_alone else None
-    verify = False if quick else section.verify
     common = _common(design, section, name, quick)
     fewer = _QUICK.get(name, {}) if quick else {}
     if name == "te_iteration":
@@ -375,11 +381,11 @@ def _request(design: DesignFile, method: str | None, quick: bool) -> OptimizeReq
         common["method"] = _made_by(name)(**options | fewer)
     if name in METHODS:
         common["rounding"] = _rounding(design, section)
-    elif method is None:
+    elif of_the_file:
         section.refuse(["rounding"], f' with method "{name}"')
     if quick:  # a quick look stays on its mesh
         common["positions"] = None
-    return OptimizeRequest(name, curve, verify, design, common)
+    return common, curve
 
 
 def _common(design: DesignFile, section: OptimizeSection, name: str, quick: bool) -> dict[str, Any]:

@@ -21,6 +21,7 @@ from .design_file import file_section
 from .flanks import FlankFileSection
 from .gears import GearSection, PairSection
 from .model_table import ModelSection, ResolutionSection
+from .optimize_table import known_methods
 from .table_keys import FileTable, family, meanings, section_of, snake, summary
 from .tables import LoadSection, further_tables
 from .value_types import allowed
@@ -90,7 +91,7 @@ def known_keys() -> dict[str, list[str]]:
     found = {}
     for kind, section in checked_tables().items():
         found[kind] = [*section.keys, *imperial.names({name: key.kind.number for name, key in section.keys.items()})]
-    return found
+    return found | {first_look.METHODS: [*known_methods()]}
 
 
 def _heading(title: str) -> str:

@@ -26,6 +26,8 @@ from .revolution import RevolutionResult as RevolutionResult
 from .revolution import RevolutionStudy as RevolutionStudy
 from .study import AbstractStudy as AbstractStudy
 from .study import AbstractStudyResult as AbstractStudyResult
+from .sweep import SweepStudy as SweepStudy
+from .sweep_result import SweepResult as SweepResult
 from .wear import WearStudy as WearStudy
 from .wear_result import WearResult as WearResult
 from .wear_scatter import manufactured_wear as manufactured_wear

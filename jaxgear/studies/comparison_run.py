@@ -8,7 +8,7 @@ import jax
 
 from ..compliance import Compliance, TabulatedCompliance
 from ..contact import Mesh
-from ..io import DesignFile, DesignFileError, OptimizeRequest
+from ..io import DesignFile, DesignFileError, Search
 from ..microgeometry import AbstractModification
 from ..optimize import (
     Front,
@@ -90,14 +90,14 @@ class ComparisonRun:
             found = dataclasses.replace(found, objectives=judged(self._problem, pinion, wheel))
         self._evaluations[name] = found
 
-    def search(self, request: OptimizeRequest, beside: Mapping[str, Modifications]) -> None:
+    def search(self, search: Search, beside: Mapping[str, Modifications]) -> None:
         """Finds the optimum, and for flanks without parameters the named curve in their place.
 
         All designs, those `beside` it too, are evaluated on the mesh on which the search has ended and by its measure.
         """
-        self._stages.begin(f"searching the optimum ({request.method})")
+        self._stages.begin(f"searching the optimum ({search.method})")
         began = time.perf_counter()
-        found = request(self._mesh, self._stages.step)
+        found = search(self._mesh, self._stages.step)
         self._front = found if isinstance(found, Front) else None
         optimum = found.compromise if isinstance(found, Front) else found
         spent = time.perf_counter() - began
@@ -111,10 +111,10 @@ class ComparisonRun:
         # of several torques it shows another one than the table does
         ppte = float(evaluated.metrics["ppte_um"])
         self._optimum = optimum = dataclasses.replace(optimum, cycle=evaluated.cycle, ppte=ppte)
-        if request.curve is not None:
-            self._stages.begin(f"projecting the flanks on a {request.curve} curve")
-            self._projection = projection = project(optimum, request.curve)
-            self.evaluate(f"as {request.curve}", projection.pinion, projection.wheel)
+        if search.curve is not None:
+            self._stages.begin(f"projecting the flanks on a {search.curve} curve")
+            self._projection = projection = project(optimum, search.curve)
+            self.evaluate(f"as {search.curve}", projection.pinion, projection.wheel)
         if self._second is not None:
             self._verify(self._second)
 

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import ClassVar, Self
 
-from ..io import DesignFile, OptimizeRequest, optimize_request
+from ..io import DesignFile, Search
 from ..io.errors import naming
 from ..io.tolerance_table import tolerance_of
 from ..microgeometry import NoModification
@@ -20,10 +20,11 @@ from .study import AbstractStudy
 class DesignOptimization(AbstractStudy[ComparisonResult]):
     """Find the best variables or flanks by the method and for the objective of the design file.
 
-    Compares the unmodified pair, the rule-based tip relief of ISO 6336-1, and the optimum.
+    Without a word about them that is the least peak-to-peak transmission error (PPTE) at the design torque. Compares
+    the unmodified pair, the rule-based tip relief of ISO 6336-1, and the optimum.
 
     Attributes:
-        request: what the file asks for.
+        search: search for the optimum.
         tolerance: of manufactured gears; None without the table [tolerance].
     """
 
@@ -32,20 +33,20 @@ class DesignOptimization(AbstractStudy[ComparisonResult]):
     coarse: ClassVar = ""  # the result says it
     needs: ClassVar = ("scipy.optimize",)
 
-    request: OptimizeRequest
+    search: Search
     tolerance: Tolerance | None
 
     @classmethod
     def of(cls, design: DesignFile, *, quick: bool = False, method: str | None = None) -> Self:
         """Optimization of a design file, see `AbstractStudy.of`; `method` replaces that of the file."""
-        request = optimize_request(design, method=method, quick=quick)
+        search = Search.of(design, method=method, quick=quick)
         with naming(design.path):
-            return cls(design, quick, request, tolerance_of(design))
+            return cls(design, quick, search, tolerance_of(design))
 
     @property
     def folder(self) -> str:
         """Folder of the results of the method below that of the design file."""
-        return f"{self.name}/{self.request.method}"
+        return f"{self.name}/{self.search.method}"
 
     def omits(self) -> str:
         """Nothing."""
@@ -54,7 +55,7 @@ class DesignOptimization(AbstractStudy[ComparisonResult]):
     def work_out(self, checkpoints: Checkpoints, stages: Stages) -> ComparisonResult:
         """All designs; keeps no checkpoints."""
         run = ComparisonRun(self.design, stages, quick=self.quick)
-        run.prepare(finer=self.request.finer, verify=self.request.verify)
+        run.prepare(finer=self.search.finer, verify=self.search.verify)
         relief, involute = rule_based(self.design), NoModification()
-        run.search(self.request, {"unmodified": (involute, involute), "rule-based": (relief, relief)})
+        run.search(self.search, {"unmodified": (involute, involute), "rule-based": (relief, relief)})
         return run.result(self.tolerance)

@@ -6,12 +6,12 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, Self
 
 from ..contact import Mesh, OperatingPoint
-from ..io import DesignFile, OptimizeRequest, WearRequest, wear_request
+from ..io import DesignFile, Search
 from ..io.errors import naming
 from ..io.tolerance_table import tolerance_of
 from ..numerics import optional_real, real
 from ..tolerance import Tolerance
-from ..wear import WearHistory, wear
+from ..wear import Wear, WearHistory
 from . import manufactured, wear_scatter
 from .checkpoints import Checkpoints, CheckpointsOfKind, Marches, NamedArrays
 from .comparison import Modifications, compared, first_mesh, search_of, sought
@@ -19,6 +19,7 @@ from .progress import Stages
 from .study import AbstractStudy
 from .wear_result import OVER_LIFE, WearResult
 
+_QUICK_BLOCKS = 4
 _MOST_BLOCKS = 1000  # of a life of manufactured gears
 
 
@@ -30,7 +31,7 @@ class WearStudy(AbstractStudy[WearResult]):
     the optimum of its variables. What an interrupted command has found is kept: the same command goes on from there.
 
     Attributes:
-        request: what the file asks for.
+        settings: revolutions and wear coefficients.
         search: for the optimum of the file; None where its modifications are numbers.
         over_life: for the lowest mean PPTE over the life, under the static load; None where nothing is sought for it.
         tolerance: of manufactured gears; None where they are not worn.
@@ -39,22 +40,24 @@ class WearStudy(AbstractStudy[WearResult]):
     name: ClassVar = "wear"
     coarse: ClassVar = "coarse positions and few blocks"
 
-    request: WearRequest
-    search: OptimizeRequest | None
-    over_life: OptimizeRequest | None
+    settings: Wear
+    search: Search | None
+    over_life: Search | None
     tolerance: Tolerance | None
 
     @classmethod
     def of(cls, design: DesignFile, *, quick: bool = False) -> Self:
         """Wear study of a design file, see `AbstractStudy.of`."""
-        request = wear_request(design, quick=quick)
+        with naming(design.path):
+            settings = design.needed("wear", "it says for how long the pair runs and how it wears").settings(design)
+            tolerance = None if wear_scatter.left_out(design) else tolerance_of(design)
+        if quick:
+            settings = dataclasses.replace(settings, blocks=_QUICK_BLOCKS, largest_increment=None)
         search = search_of(design, quick=quick)
         # a step of the search wears a life: under the static load, which takes far less than a motion in every block
-        static = dataclasses.replace(request.settings, line_load=None, dynamics=None)
+        static = dataclasses.replace(settings, line_load=None, dynamics=None)
         over_life = None if search is None else search.over_life(static)
-        with naming(design.path):
-            tolerance = None if wear_scatter.left_out(design) else tolerance_of(design)
-        return cls(design, quick, request, search, over_life, tolerance)
+        return cls(design, quick, settings, search, over_life, tolerance)
 
     def omits(self) -> str:
         """Manufactured gears under the dynamic line load."""
@@ -76,7 +79,7 @@ class WearStudy(AbstractStudy[WearResult]):
             stages.begin("wear of manufactured gears of all designs")
             # of one length, as quantities take them, and as many as the nominal gears have taken
             blocks = min(max(len(history.revolutions) - 1 for history in histories.values()), _MOST_BLOCKS)
-            settings = dataclasses.replace(self.request.settings, blocks=blocks)
+            settings = dataclasses.replace(self.settings, blocks=blocks, largest_increment=None)
             scatters = wear_scatter.manufactured_wear(
                 settings,
                 mesh,
@@ -86,31 +89,19 @@ class WearStudy(AbstractStudy[WearResult]):
                 **manufactured.drawn(design, quick=quick),
                 keep=checkpoints.of(NamedArrays()),
             )
-        return WearResult(design, self.request, designs, histories, scatters)
+        return WearResult(design, self.settings, designs, histories, scatters)
 
     def _life(
         self, mesh: Mesh, name: str, flanks: Modifications, kept: CheckpointsOfKind[Any], stages: Stages
     ) -> WearHistory:
         """The life of one design, at the torque of the file."""
         stages.begin(f"wear of the {name} design")
-        design, settings, (pinion, wheel) = self.design, self.request.settings, flanks
+        design, (pinion, wheel) = self.design, flanks
 
         def progress(done: float, total: float) -> None:
             stages.count(int(done), int(total), f"{done:.3g} of {total:.3g} revolutions")
 
-        return wear(
-            mesh,
-            settings.loads
-            or OperatingPoint(real(design.torque), optional_real(design.speed), optional_real(design.friction)),
-            settings.revolutions,
-            coefficient=settings.coefficients,
-            pinion=pinion,
-            wheel=wheel,
-            points=settings.points,
-            dynamics=settings.dynamics,
-            line_load=settings.line_load,
-            blocks=settings.blocks,
-            largest_increment=self.request.largest_increment,
-            keep=kept,
-            callback=progress,
-        )
+        load = None
+        if self.settings.loads is None:
+            load = OperatingPoint(real(design.torque), optional_real(design.speed), optional_real(design.friction))
+        return self.settings.history(mesh, load, pinion=pinion, wheel=wheel, keep=kept, callback=progress)
