@@ -178,7 +178,6 @@ OF_ANY_TYPE = {
     "io/design_file.py DesignFile.spectrum": "takes any table with torques and weights",
     "io/gears.py with_quality": "takes any table with quality classes",
     "io/table_keys.py as_field": "a value of a file, for a field of any type",
-    "io/table_keys.py built": "makes an object of the class that the table names",
     "io/table_keys.py entry": "stands for the value of a key, whose annotation says the type",
     "io/tables.py FurtherTable.check": "takes a `DesignFile`, whose file imports this one",
     "io/tables.py FurtherTable.quantity": "likewise",

@@ -38,7 +38,7 @@ from jaxgear.microgeometry import NoModification
 from jaxgear.numerics import Usual
 from jaxgear.optimize import result as optimum_result
 from jaxgear.studies import evaluation, gear_data, manufactured, optimum_report, side_by_side
-from jaxgear.studies.comparison_run import ComparisonRun
+from jaxgear.studies.analysis import ComparisonRun
 from jaxgear.studies.gear_data import gears
 from jaxgear.studies.optimum_report import front_rows, front_table, gains
 from jaxgear.tolerance import ToleranceClass, iso_rounded

@@ -15,7 +15,7 @@ from jaxgear.contact import OperatingPoint
 from jaxgear.io import DesignFileError, Search, load_design, quantities_of_tables
 from jaxgear.metrics import share_settings
 from jaxgear.numerics import program
-from jaxgear.studies import DesignAnalysis, SweepStudy, evaluation
+from jaxgear.studies import AnalysisStudy, SweepStudy, evaluation
 
 pytestmark = pytest.mark.usefixtures("no_cache")
 
@@ -191,7 +191,7 @@ def test_analysis_and_sweep_give_what_the_library_gives(load, file, tmp_path, ca
         sweep_table(file(PAIR + "friction = 0.05" + OIL + STRENGTH + RELIEF), tmp_path)
     fixed = RELIEF.partition("[variables]")[0].replace('"amount"', "6.0")
     path = file(PAIR + OIL + STRENGTH + fixed)
-    assert run.run_study(DesignAnalysis, {}, path, tmp_path / "out", figures=False, cache=False)
+    assert run.run_study(AnalysisStudy, {}, path, tmp_path / "out", figures=False, cache=False)
     summary = json.loads((tmp_path / "out" / "summary.json").read_text())
     modified, expected = summary["designs"]["modified"], solved(6.0)
     assert [modified[quantity.key] for quantity in numbers] == pytest.approx([float(number) for number in expected])

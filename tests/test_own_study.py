@@ -251,7 +251,7 @@ def test_other_packages_are_looked_for_only_where_a_name_is_unknown():
 def test_a_library_prints_nothing_and_writes_where_it_is_asked(file, tmp_path, capsys, monkeypatch):
     """The studies of the commands are studies like any other."""
     monkeypatch.setattr("jaxgear.studies.evaluation._TORQUES", 5)
-    study, stages = studies.DesignAnalysis.of(load_design(file(FIXED))), []
+    study, stages = studies.AnalysisStudy.of(load_design(file(FIXED))), []
     result = study.run(callback=lambda progress: stages.append(progress.stage))
     assert stages == ["preparing the mesh", "solving the unmodified design", "solving the modified design"]
     data, figures = studies.write_results(tmp_path / "new" / "results", study, result, figures=False)

@@ -17,8 +17,10 @@ from ..io.first_look import check_keys, known_methods
 from ..studies import registry
 from ..version import version as own_version
 from . import interrupt, streams
-from .options import File, NoCache, NoFigures, Quick, Reported, output_option
 
+Quick = Annotated[
+    bool, typer.Option("--quick", help="Coarse positions and a short search: for a first look, not for a result.")
+]
 OK, NOT_CONVERGED, FAILED, INTERRUPTED = 0, 1, 2, 130
 
 
@@ -90,19 +92,10 @@ def new(
 
     A file that is there is never replaced.
     """
+    given = locals()
     with interrupt.importing():
         from .convert import new
-    new(
-        file,
-        teeth,
-        module=module,
-        torque=torque,
-        face_width=face_width,
-        speed=speed,
-        helix_angle=helix_angle,
-        pressure_angle=pressure_angle,
-        profile_shift=profile_shift,
-    )
+    new(given.pop("file"), **given)
     return OK
 
 
@@ -120,14 +113,23 @@ def _command_of(place: str, name: str, own: Callable[..., Mapping[str, Any]]) ->
         name: name of the command.
         own: function of its own arguments and options that gives the arguments of `AbstractStudy.of`.
     """
+    folder = _FOLDERS.get(name, name)
 
     def shared(
         context: typer.Context,
-        file: File,
-        output: Annotated[Path | None, output_option(_FOLDERS.get(name, name))] = None,
-        no_figures: NoFigures = False,
-        reported: Reported = False,
-        no_cache: NoCache = False,
+        file: Annotated[Path, typer.Argument(metavar="FILE.toml", help="Design file.", show_default=False)],
+        output: Annotated[
+            Path | None,
+            typer.Option("--output", "-o", metavar="DIR", help="Result folder.", show_default=f"results/FILE/{folder}"),
+        ] = None,
+        no_figures: Annotated[bool, typer.Option("--no-figures", help="Write no figures.")] = False,
+        reported: Annotated[
+            bool,
+            typer.Option("--report", help="Write report.html too, a self-contained file (needs jaxgear\\[report])."),
+        ] = False,
+        no_cache: Annotated[
+            bool, typer.Option("--no-cache", envvar="JAXGEAR_NO_CACHE", help="Do not keep compiled programs on disk.")
+        ] = False,
     ) -> Mapping[str, Any]:
         return {
             "file": file,
@@ -159,11 +161,11 @@ def _command_of(place: str, name: str, own: Callable[..., Mapping[str, Any]]) ->
 
 
 def _analyze() -> dict[str, Any]:
-    return {}
+    return locals()
 
 
 def _plain(quick: Quick = False) -> dict[str, Any]:
-    return {"quick": quick}
+    return locals()
 
 
 def _optimize(
@@ -173,7 +175,7 @@ def _optimize(
     ] = None,
     quick: Quick = False,
 ) -> dict[str, Any]:
-    return {"method": method, "quick": quick}
+    return locals()
 
 
 def _identify(
@@ -194,14 +196,7 @@ def _identify(
     ] = False,
     quick: Quick = False,
 ) -> dict[str, Any]:
-    return {
-        "measured": measured,
-        "noise": noise,
-        "torque_scale": torque_scale,
-        "offset": offset,
-        "pitch": pitch,
-        "quick": quick,
-    }
+    return locals()
 
 
 def _sweep(

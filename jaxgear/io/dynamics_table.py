@@ -26,6 +26,8 @@ class DynamicsSection(FurtherTable, section_of(Dynamics, ("mesh_frequencies",), 
             acceleration; no run-up without it.
     """
 
+    table = "dynamics"
+
     mesh_frequencies: list[float] | None = entry(list_of(positive("Hz"), length=2))
     speeds: list[float] | None = entry(list_of(positive("rpm"), length=2))
     number: int = entry(count(2, 10_000), 100)

@@ -1,6 +1,7 @@
 """Table [layout] of a design file: settings of the flank line and profile layout."""
 
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any, Self
 
 from ..conditions import LoadSpectrum
@@ -9,16 +10,17 @@ from ..numerics import Number
 from ..shafts import Misalignment
 from .design_file import DesignFile
 from .errors import DesignFileError, refused
-from .gears import both_classes, with_quality
-from .table_keys import FileTable, built, entry, nested, section_of
-from .tables import FurtherTable, Rest
+from .gears import both_classes
+from .table_keys import FileTable, entry, nested
+from .tables import FurtherTable
+from .template import Part
 from .value_types import QUALITY_CLASSES, choice, count, either, list_of, positive, real, switch
 
 _AMOUNTS = list_of(real(Number("um", low=0.0)))
 _FURTHER = list_of(real(Number("um")))
 _LENGTHS = either(positive("mm"), list_of(positive("mm")), "a number or a list of numbers")
 _HOURS = list_of(real(Number("h", low=0.0)))
-_AXES = either(choice("class"), nested(section_of(Misalignment, open=False)), '"class" or a table')
+_AXES = either(choice("class"), nested(Misalignment, open=False), '"class" or a table')
 
 
 class ProfileSection(FileTable):
@@ -101,7 +103,7 @@ class LayoutSection(FurtherTable):
     table = "layout"
 
     quality_class: int | list[int] | None = entry(QUALITY_CLASSES)
-    misalignment: str | FileTable | None = entry(_AXES)
+    misalignment: str | Part | None = entry(_AXES)
     gear: str = entry(choice("pinion", "wheel"), "wheel")
     direction: str = entry(choice("counterclockwise", "clockwise"), "counterclockwise")
     further_crowning: str = entry(choice("rule", "least"), "rule")
@@ -114,12 +116,12 @@ class LayoutSection(FurtherTable):
     profile: ProfileSection | None = entry(nested(ProfileSection))
 
     @classmethod
-    def read(cls, given: Mapping[str, Any], rest: Rest) -> object:
-        """The table, with the quality classes of the gears where it has none of its own."""
+    def read(cls, given: Mapping[str, Any], folder: Path) -> Self:
+        """The table, see `FurtherTable.read`."""
         if "bearing_span" in given:
             instead = 'misalignment = "class", or misalignment = { skew = ..., inclination = ..., bearing_span = ... }'
             raise DesignFileError("layout.bearing_span", f"has no effect without skew or inclination: write {instead}")
-        return with_quality(super().read(given, rest), rest.quality_classes)
+        return super().read(given, folder)
 
     def check(self, design: DesignFile) -> None:
         """Refuses axes, a duty cycle or profile modifications that do not go together."""
@@ -174,11 +176,11 @@ class LayoutSection(FurtherTable):
         return {"[layout.profile]": ProfileSection}
 
 
-def _axes(section: str | FileTable | None, width: float):
+def _axes(section: str | Part | None, width: float):
     """Limits of the axes, as `flank_line_tolerance` takes them."""
-    if not isinstance(section, FileTable):
+    if not isinstance(section, Part):
         return section
-    key, amounts = section.at, section.given()
+    key, amounts = section.key, {name: float(value) for name, value in section.fields.items()}
     span = amounts.pop("bearing_span", None)
     for name, value in amounts.items():
         if value < 0:
@@ -189,4 +191,4 @@ def _axes(section: str | FileTable | None, width: float):
         raise DesignFileError(f"{key}.bearing_span", f"{span:g} mm must be at least {width:g} mm, the face width")
     if not amounts:
         raise DesignFileError(key, "must have skew or inclination over a bearing_span, or direct")
-    return built(section)
+    return section.build({})

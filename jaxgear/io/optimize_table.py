@@ -4,6 +4,7 @@ import dataclasses
 from collections.abc import Callable, Mapping
 from typing import Any, Self
 
+from ..compliance import TabulatedCompliance
 from ..contact import Mesh
 from ..metrics import Quantity
 from ..numerics import AbstractMeasure, Callback, CVaR, Mean, Number, Quantile, Worst
@@ -30,7 +31,7 @@ from .errors import DesignFileError, check_known, naming, refused, suggestion
 from .model_table import FINITE_ELEMENTS
 from .named_quantities import quantity_named
 from .table_keys import FileTable, Key, entry, nested, section_of
-from .tables import FurtherTable, Rest
+from .tables import FurtherTable
 from .tolerance_table import tolerance_of
 from .value_types import (
     LEVEL,
@@ -174,26 +175,22 @@ class OptimizeSection(FurtherTable):
     constraint: list[ConstraintSection] = entry(list_of(nested(ConstraintSection), empty=True), [])
 
     @classmethod
-    def now(cls) -> "type[OptimizeSection]":
-        """With the options of the methods that are known by now."""
+    def every_key(cls) -> dict[str, Key]:
+        """Keys of the table, with the options of the methods that are known by now."""
         options = method_options().items()
-        keys = {name: Key(nested(section), meaning="options of the method.") for name, section in options}
-        return type(cls.__name__, (OptimizeSection,), {**keys, "__doc__": OptimizeSection.__doc__, "made": True})
-
-    def check_beside(self, rest: Rest) -> None:
-        """Refuses a search without variables, one by manufactured gears without tolerances, and a needless check."""
-        if not rest.bounds and self.method not in METHODS_WITHOUT_VARIABLES:
-            raise DesignFileError("optimize", "has no effect without [variables]")
-        if self.verify and rest.model.structure == FINITE_ELEMENTS:
-            raise DesignFileError("optimize.verify", f'has no effect with model.structure = "{FINITE_ELEMENTS}"')
-        if self.manufactured is not None and "tolerance" not in rest.names:
-            raise DesignFileError("optimize.manufactured", "needs the table [tolerance]")
+        return cls.keys | {name: Key(nested(section), meaning="options of the method.") for name, section in options}
 
     def check(self, design: DesignFile) -> None:
         """As a search does, whatever method the command line asks for."""
+        if not design.bounds and self.method not in METHODS_WITHOUT_VARIABLES:
+            raise DesignFileError("optimize", "has no effect without [variables]")
+        if self.verify and isinstance(design.compliance, TabulatedCompliance):
+            raise DesignFileError("optimize.verify", f'has no effect with model.structure = "{FINITE_ELEMENTS}"')
+        if self.manufactured is not None and "tolerance" not in design.tables:
+            raise DesignFileError("optimize.manufactured", "needs the table [tolerance]")
         check_known("optimize.method", self.method or _DEFAULT_METHOD, known_methods())
         for name in method_options():
-            if self.given().get(name) is not None:
+            if self.fields.get(name) is not None:
                 _check_options(design, name, self.options(name))
         _objectives(design, self)
         _measure(self)
@@ -439,7 +436,7 @@ def _constraints(design: DesignFile, section: OptimizeSection) -> tuple[Constrai
 
 
 def _constraint(design: DesignFile, section: ConstraintSection) -> Constraint:
-    key = section.at
+    key = section.key
     of: Any = section.variables if section.of is None else section.of
     unit = ""
     if of is None or (section.of is not None and section.variables is not None):
@@ -468,13 +465,13 @@ def _rounding(design: DesignFile, section: OptimizeSection) -> dict[str, float]:
     steps: dict[str, float] = {}
     for name, key in ((name, _STEPS[unit]) for name, unit in design.units.items() if unit in _STEPS):
         step = getattr(asked, key)
-        if step and (key in asked.given() or multiples(step, *design.bounds[name])):
+        if step and (key in asked.fields or multiples(step, *design.bounds[name])):
             steps[name] = step
     for name in asked.variables or {}:
         if name not in design.bounds:
             problem = f'"{name}" is not a variable, {suggestion(name, design.bounds)}'
-            raise DesignFileError(f"{asked.at}.variables", problem)
-    return refused(asked.at, check_steps, "optimize", {**steps, **(asked.variables or {})}, design.bounds)
+            raise DesignFileError(f"{asked.key}.variables", problem)
+    return refused(asked.key, check_steps, "optimize", {**steps, **(asked.variables or {})}, design.bounds)
 
 
 def _check_reachable(design: DesignFile, key: str, of: str | Quantity, low: float | None) -> None:

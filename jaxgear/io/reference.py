@@ -90,7 +90,8 @@ def known_keys() -> dict[str, list[str]]:
     """Keys of these tables as a file may write them."""
     found = {}
     for kind, section in checked_tables().items():
-        found[kind] = [*section.keys, *imperial.names({name: key.kind.number for name, key in section.keys.items()})]
+        keys = section.every_key()
+        found[kind] = [*keys, *imperial.names({name: key.kind.number for name, key in keys.items()})]
     return found | {first_look.METHODS: [*known_methods()]}
 
 
@@ -133,12 +134,12 @@ def _types(title: str, base: type[eqx.Module]) -> Iterator[tuple[str, type[FileT
 def _table(title: str, section: type[FileTable]) -> Iterator[str]:
     yield f"\n## {_heading(title)}\n"
     yield summary(section if section.__doc__ else section.source) + "\n"
-    if not section.keys:
+    if not section.every_key():
         return
     texts = meanings(section.source) | meanings(section)
     yield "| Key | Value | Unit | Range | Default | Meaning |"
     yield "| --- | --- | --- | --- | --- | --- |"
-    for name, key in section.keys.items():
+    for name, key in section.every_key().items():
         number = key.kind.number
         cells = [
             f"`{name}`",

@@ -14,7 +14,7 @@ from .errors import DesignFileError, referring, refused
 from .named_quantities import quantity_named
 from .rows import read_variants
 from .table_keys import entry
-from .tables import FurtherTable, Rest
+from .tables import FurtherTable
 from .tolerance_table import tolerance_of
 from .value_types import LEVEL, SEED, WEIGHTS, choice, count, either, list_of, positive, real, table, text
 
@@ -63,15 +63,12 @@ class SweepSection(FurtherTable):
     results: list[str] | None = entry(list_of(text()))
     part_rows: int | None = entry(count(1, 2**24))
 
-    def check_beside(self, rest: Rest) -> None:
-        """Refuses variants of nothing, and what another kind of sampling takes."""
-        if not rest.bounds:
+    def check(self, design: DesignFile) -> None:
+        """As a sweep does, but for a file of variants; refuses variants of nothing, and keys of another sampling."""
+        if not design.bounds:
             raise DesignFileError("sweep", "has no effect without [variables]")
         others = [key for key in ("samples", "seed", "levels", "file") if key not in _KEYS[self.sampling]]
         self.refuse(others, f' with sampling = "{self.sampling}"')
-
-    def check(self, design: DesignFile) -> None:
-        """As a sweep does, but for a file of variants."""
         self.quantities(design)
         self.load(design)
         needed = _KEYS[self.sampling][0]  # the command line may give it

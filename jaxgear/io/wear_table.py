@@ -25,6 +25,8 @@ class WearSection(FurtherTable, section_of(Wear, ("dynamics", "loads"), open=Fal
         speeds: of the pinion at every torque; that of the file without it.
     """
 
+    table = "wear"
+
     line_load: str = entry(choice("static", "dynamic"), "static")
     torques: list[float] | None = entry(list_of(positive("N m")))
     weights: list[float] | None = entry(WEIGHTS)

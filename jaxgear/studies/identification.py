@@ -53,7 +53,7 @@ class _Flanks(eqx.Module):
 
 
 @dataclass(frozen=True)
-class DesignIdentification(AbstractStudy["IdentificationResult"]):
+class IdentificationStudy(AbstractStudy["IdentificationResult"]):
     """Find the values of the variables that gave a measured transmission error, and how well it tells them.
 
     The file has the columns torque_Nm, te_um, and phase (base pitches) or angle_deg (of the pinion). An error that is

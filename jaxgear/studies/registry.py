@@ -16,15 +16,15 @@ _GROUP = "jaxgear.studies"
 OWN = {
     name: f"{__package__}.{place}"
     for name, place in {
-        "analyze": "design_analysis:DesignAnalysis",
-        "optimize": "optimization:DesignOptimization",
+        "analyze": "analysis:AnalysisStudy",
+        "optimize": "analysis:OptimizationStudy",
         "sweep": "sweep:SweepStudy",
         "layout": "layout:LayoutStudy",
         "dynamics": "dynamics:DynamicsStudy",
         "wear": "wear:WearStudy",
         "revolution": "revolution:RevolutionStudy",
         "export": "export:ExportStudy",
-        "identify": "identification:DesignIdentification",
+        "identify": "identification:IdentificationStudy",
     }.items()
 }
 

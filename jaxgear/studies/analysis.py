@@ -1,15 +1,19 @@
-"""A comparison of designs as it goes on: its mesh, its search, and what it has found so far."""
+"""Analysis and optimization: designs evaluated side by side on one mesh, and the search for the best of them."""
 
 import dataclasses
 import time
 from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar, Self
 
 import jax
 
 from ..compliance import Compliance, TabulatedCompliance
 from ..contact import Mesh
 from ..io import DesignFile, DesignFileError, Search
-from ..microgeometry import AbstractModification
+from ..io.errors import naming
+from ..io.tolerance_table import tolerance_of
+from ..microgeometry import AbstractModification, NoModification
 from ..optimize import (
     Front,
     Optimum,
@@ -23,11 +27,13 @@ from ..optimize import (
 )
 from ..tolerance import Tolerance
 from . import manufactured, side_by_side
-from .comparison import Modifications
+from .checkpoints import Checkpoints
+from .comparison import Modifications, rule_based
 from .comparison_result import ComparisonResult
 from .evaluation import Evaluation, coarse, evaluate, torques_of
 from .optimum_report import COMPROMISE
 from .progress import Stages
+from .study import AbstractStudy
 
 
 class ComparisonRun:
@@ -146,3 +152,88 @@ class ComparisonRun:
             self._searched_at,
             self._unverified,
         )
+
+
+@dataclass(frozen=True)
+class AnalysisStudy(AbstractStudy[ComparisonResult]):
+    """Analyze the unmodified pair and the modification of the design file.
+
+    Attributes:
+        tolerance: of manufactured gears; None without the table [tolerance].
+    """
+
+    name: ClassVar = "analyze"
+    takes_coast: ClassVar = True
+    coarse: ClassVar = ""
+
+    tolerance: Tolerance | None
+
+    @classmethod
+    def of(cls, design: DesignFile, *, quick: bool = False) -> Self:
+        """Analysis of a design file in which every variable has a value, see `AbstractStudy.of`."""
+        free = [name for name in design.bounds if design.open_case or name not in design.values]
+        if free:
+            says = "give each a value or use jaxgear optimize"
+            problem = f"analyze needs numbers, these are free: {', '.join(free)}; {says}"
+            raise DesignFileError("variables", problem, design.path)
+        with naming(design.path):
+            return cls(design, quick, tolerance_of(design))
+
+    def omits(self) -> str:
+        """Nothing."""
+        return ""
+
+    def work_out(self, checkpoints: Checkpoints, stages: Stages) -> ComparisonResult:
+        """Both designs; keeps no checkpoints."""
+        run = ComparisonRun(self.design, stages, quick=self.quick)
+        run.prepare()
+        run.evaluate("unmodified", NoModification(), NoModification())
+        pinion, wheel = self.design.design(self.design.values)
+        if not (isinstance(pinion, NoModification) and isinstance(wheel, NoModification)):
+            run.evaluate("modified", pinion, wheel)
+        return run.result(self.tolerance)
+
+
+@dataclass(frozen=True)
+class OptimizationStudy(AbstractStudy[ComparisonResult]):
+    """Find the best variables or flanks by the method and for the objective of the design file.
+
+    Without a word about them that is the least peak-to-peak transmission error (PPTE) at the design torque. Compares
+    the unmodified pair, the rule-based tip relief of ISO 6336-1, and the optimum.
+
+    Attributes:
+        search: search for the optimum.
+        tolerance: of manufactured gears; None without the table [tolerance].
+    """
+
+    name: ClassVar = "optimize"
+    takes_coast: ClassVar = True
+    coarse: ClassVar = ""  # the result says it
+    needs: ClassVar = ("scipy.optimize",)
+
+    search: Search
+    tolerance: Tolerance | None
+
+    @classmethod
+    def of(cls, design: DesignFile, *, quick: bool = False, method: str | None = None) -> Self:
+        """Optimization of a design file, see `AbstractStudy.of`; `method` replaces that of the file."""
+        search = Search.of(design, method=method, quick=quick)
+        with naming(design.path):
+            return cls(design, quick, search, tolerance_of(design))
+
+    @property
+    def folder(self) -> str:
+        """Folder of the results of the method below that of the design file."""
+        return f"{self.name}/{self.search.method}"
+
+    def omits(self) -> str:
+        """Nothing."""
+        return ""
+
+    def work_out(self, checkpoints: Checkpoints, stages: Stages) -> ComparisonResult:
+        """All designs; keeps no checkpoints."""
+        run = ComparisonRun(self.design, stages, quick=self.quick)
+        run.prepare(finer=self.search.finer, verify=self.search.verify)
+        relief, involute = rule_based(self.design), NoModification()
+        run.search(self.search, {"unmodified": (involute, involute), "rule-based": (relief, relief)})
+        return run.result(self.tolerance)
