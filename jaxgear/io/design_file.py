@@ -40,7 +40,7 @@ from .gears import (
     with_quality,
 )
 from .model_table import ModelSection, ResolutionSection, model_part, resolution_of, with_tables
-from .table_keys import FileTable, Key, decode, entry, nested, part_of, summary
+from .table_keys import FileTable, decode, entry, nested, part_of, summary
 from .tables import FurtherTable, LoadSection, further_tables
 from .template import Free, Part, build
 from .toml import read
@@ -105,7 +105,7 @@ class FileSection(FileTable):
 def file_section(further: Mapping[str, type[FurtherTable]]) -> type[FileSection]:
     """The keys of a whole file with further tables."""
     texts = {name: summary(cls) for name, cls in further.items()}
-    keys = {name: Key(table(), meaning=text[:1].lower() + text[1:]) for name, text in texts.items()}
+    keys = {name: replace(table(), meaning=text[:1].lower() + text[1:]) for name, text in texts.items()}
     return type("FileSection", (FileSection,), {**keys, "__doc__": FileSection.__doc__})
 
 

@@ -30,13 +30,14 @@ from .design_file import DesignFile
 from .errors import DesignFileError, check_known, naming, refused, suggestion
 from .model_table import FINITE_ELEMENTS
 from .named_quantities import quantity_named
-from .table_keys import FileTable, Key, entry, nested, section_of
+from .table_keys import FileTable, entry, nested, section_of
 from .tables import FurtherTable
 from .tolerance_table import tolerance_of
 from .value_types import (
     LEVEL,
     SEED,
     WEIGHTS,
+    Kind,
     choice,
     count,
     either,
@@ -175,10 +176,12 @@ class OptimizeSection(FurtherTable):
     constraint: list[ConstraintSection] = entry(list_of(nested(ConstraintSection), empty=True), [])
 
     @classmethod
-    def every_key(cls) -> dict[str, Key]:
+    def every_key(cls) -> dict[str, Kind]:
         """Keys of the table, with the options of the methods that are known by now."""
         options = method_options().items()
-        return cls.keys | {name: Key(nested(section), meaning="options of the method.") for name, section in options}
+        return cls.keys | {
+            name: dataclasses.replace(nested(section), meaning="options of the method.") for name, section in options
+        }
 
     def check(self, design: DesignFile) -> None:
         """As a search does, whatever method the command line asks for."""

@@ -91,7 +91,7 @@ def known_keys() -> dict[str, list[str]]:
     found = {}
     for kind, section in checked_tables().items():
         keys = section.every_key()
-        found[kind] = [*keys, *imperial.names({name: key.kind.number for name, key in keys.items()})]
+        found[kind] = [*keys, *imperial.names({name: key.number for name, key in keys.items()})]
     return found | {first_look.METHODS: [*known_methods()]}
 
 
@@ -140,10 +140,10 @@ def _table(title: str, section: type[FileTable]) -> Iterator[str]:
     yield "| Key | Value | Unit | Range | Default | Meaning |"
     yield "| --- | --- | --- | --- | --- | --- |"
     for name, key in section.every_key().items():
-        number = key.kind.number
+        number = key.number
         cells = [
             f"`{name}`",
-            key.kind.words,
+            key.words,
             number.unit if number else "",
             allowed(dataclasses.replace(number, unit="")) if number else "",
             "required" if key.default is ... else _default(name, key.default, section.source),

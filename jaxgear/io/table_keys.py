@@ -26,24 +26,9 @@ from .trade_words import unknown_key
 from .value_types import Kind, choice, either, list_of, not_of_kind, real, rows_of, switch, table, text
 
 
-@dataclasses.dataclass(frozen=True)
-class Key:
-    """A key of a table.
-
-    Attributes:
-        kind: what may stand after it.
-        default: what holds where the file does not have it; `...` where it must.
-        meaning: for the reference; "" for that in the docstring of the table.
-    """
-
-    kind: Kind
-    default: Any = None
-    meaning: str = ""
-
-
 def entry(kind: Kind, default: Any = None) -> Any:
-    """Declares a key of a table as an attribute of its class, see `Key`."""
-    return Key(kind, default)
+    """Declares a key of a table as an attribute of its class; a default of `...` makes it a required key."""
+    return dataclasses.replace(kind, default=default)
 
 
 class FileTable:
@@ -58,7 +43,7 @@ class FileTable:
         written: imperial keys that the file has in place of those of the table, by these.
     """
 
-    keys: ClassVar[dict[str, Key]] = {}
+    keys: ClassVar[dict[str, Kind]] = {}
     source: ClassVar[Any] = None
     table: ClassVar[str] = ""
     key: str = ""
@@ -66,7 +51,7 @@ class FileTable:
     written: Mapping[str, str] = {}
 
     def __init_subclass__(cls) -> None:
-        own = {name: value for name, value in vars(cls).items() if isinstance(value, Key)}
+        own = {name: value for name, value in vars(cls).items() if isinstance(value, Kind)}
         inherited = [vars(base).get("keys", {}) for base in reversed(cls.__mro__[1:])]
         cls.keys = functools.reduce(operator.or_, [*inherited, own])
 
@@ -78,7 +63,7 @@ class FileTable:
                 setattr(self, name, given.get(name, None if allowed.default is ... else allowed.default))
 
     @classmethod
-    def every_key(cls) -> dict[str, Key]:
+    def every_key(cls) -> dict[str, Kind]:
         """Keys by their names, by default those of the attributes."""
         return cls.keys
 
@@ -105,13 +90,13 @@ def decode(key: str, data: object, section: type[S]) -> S:
     if not isinstance(data, dict):
         raise DesignFileError(key, not_of_kind("a table", data))
     keys = section.every_key()
-    numbers = {name: allowed.kind.number for name, allowed in keys.items()}
+    numbers = {name: allowed.number for name, allowed in keys.items()}
     data, written = imperial.metric(key, data, numbers)
     unknown = next((name for name in data if name not in keys), None)
     values = {}
     for name, allowed in keys.items():
         if name in data:
-            values[name] = allowed.kind.read(join(key, written.get(name, name)), data[name])
+            values[name] = allowed.read(join(key, written.get(name, name)), data[name])
         elif allowed.default is ... and unknown is None:
             raise DesignFileError(join(key, name), "missing, this key is required")
         elif allowed.default is ...:  # often it is there, misspelt
