@@ -169,12 +169,16 @@ def answer(problem: Problem, row: tuple[str, ...], refused: Counter[str]) -> Ans
     began = time.perf_counter()
     try:
         found = jg.minimize(
-            design,
-            problem.bounds,
-            mesh=jg.prepare(problem.pair, resolution=SEARCH),
-            torque=problem.load,
-            objective=QUANTITIES[row[0]],
-            constraints=[jg.Constraint(QUANTITIES[name], **{side: limit}) for name, (side, limit) in limits.items()],
+            jg.Problem(
+                jg.prepare(problem.pair, resolution=SEARCH),
+                problem.load,
+                design,
+                problem.bounds,
+                objective=QUANTITIES[row[0]],
+                constraints=[
+                    jg.Constraint(QUANTITIES[name], **{side: limit}) for name, (side, limit) in limits.items()
+                ],
+            ),
             positions=POSITIONS,
         )
     except RuntimeError as error:

@@ -73,14 +73,14 @@ def _ppte(mesh: jg.Mesh, x):
 
 def _evaluated(mesh: jg.Mesh, x):
     pinion, wheel = _reliefs(x)
-    return jg.optimize.evaluate("ppte", mesh, TORQUE, pinion=pinion, wheel=wheel)
+    return jg.optimize.evaluate(mesh, TORQUE, "ppte", pinion=pinion, wheel=wheel)
 
 
 def _dynamic_factor(mesh: jg.Mesh, x):
     pinion, wheel = _reliefs(x)
     dynamics = jg.dynamics.Dynamics(mesh_frequencies=[1500.0])
     point = jg.OperatingPoint(TORQUE)
-    return jg.optimize.evaluate(dynamics.quantity("worst_dynamic_factor"), mesh, point, pinion=pinion, wheel=wheel)
+    return jg.optimize.evaluate(mesh, point, dynamics.quantity("worst_dynamic_factor"), pinion=pinion, wheel=wheel)
 
 
 def _gradient(of: Callable[[jg.Mesh, Any], Any]) -> Callable[[jg.Mesh, Any], Any]:

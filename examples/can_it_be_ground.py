@@ -59,22 +59,22 @@ def designs(mesh, fast=False) -> dict[str, jg.optimize.Optimum]:
     """Optima by name; the first one is limited to what the wheel can do, which costs it nothing here."""
     limits = [jg.Constraint(f"{gear}_quadratic_deviation", high=WITHIN) for gear in ("pinion", "wheel")]
     options = {"positions": None} if fast else {}
+    iteration = jg.optimize.TransmissionErrorIteration
+    search = jg.optimize.SLP(starts=1, rounds=1) if fast else jg.optimize.SLP()
     found = {
         "curve": jg.minimize(
-            design, BOUNDS, mesh=mesh, torque=TORQUE, constraints=limits, starts=2 if fast else None, **options
+            jg.Problem(mesh, TORQUE, design, BOUNDS, constraints=limits),
+            jg.optimize.SLP(starts=2) if fast else "slp",
+            **options,
         ),
-        "type 1": jg.optimize.iterate_transmission_error(mesh, TORQUE, max_relief=LARGEST),
-        "type 2": jg.optimize.iterate_from_low_pressure(
-            spline,
-            SPLINE_BOUNDS,
-            mesh=mesh,
-            torque=TORQUE,
-            max_relief=LARGEST,
-            method=jg.optimize.SLP(starts=1, rounds=1) if fast else jg.optimize.SLP(),
+        "type 1": jg.minimize(jg.Problem(mesh, TORQUE), iteration(max_relief=LARGEST)),
+        "type 2": jg.minimize(
+            jg.Problem(mesh, TORQUE, spline, SPLINE_BOUNDS),
+            iteration("low_pressure", max_relief=LARGEST, search=search),
         ),
     }
     if not fast:
-        found["free form"] = jg.free_form(mesh, TORQUE, max_relief=LARGEST, points=16)
+        found["free form"] = jg.minimize(jg.Problem(mesh, TORQUE), jg.optimize.FreeForm(points=16, max_relief=LARGEST))
     return found
 
 

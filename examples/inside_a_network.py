@@ -44,7 +44,7 @@ class Designer(eqx.Module):
 def loss(model, torques):
     """Mean over the torques of PPTE relative to the torque [um / (50 N m)]; soft extremes, which have slopes."""
     curves = jax.vmap(lambda torque: model(torque).transmission_error)(torques)
-    return jnp.mean(jg.smooth_peak_to_peak(curves, 0.05) * 50.0 / torques)
+    return jnp.mean(jg.metrics.smooth_peak_to_peak(curves, 0.05) * 50.0 / torques)
 
 
 def train(model, steps, batch):

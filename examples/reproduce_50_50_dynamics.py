@@ -111,8 +111,8 @@ def prepare() -> jg.Mesh:
 
 def reliefs(mesh: jg.Mesh, fast=False) -> dict:
     """Modifications of both gears: none, the study's type 1, and its type 2 (not when fast)."""
-    limits = {"max_pressure": ALLOWED}
-    type_1 = jg.optimize.iterate_transmission_error(mesh, NOMINAL, max_relief=HIGHEST, **limits)
+    iteration = jg.optimize.TransmissionErrorIteration
+    type_1 = jg.minimize(jg.Problem(mesh, NOMINAL), iteration(max_relief=HIGHEST, max_pressure=ALLOWED))
     found = {"unmodified": (None, None), "type 1": (type_1.pinion, type_1.wheel)}
     if fast:
         return found
@@ -123,10 +123,9 @@ def reliefs(mesh: jg.Mesh, fast=False) -> dict:
         return relief, relief
 
     bounds = {"amount": (1.0, height), "length": (1.0, 3.27), "node": (0.05, 1.0)}
-    limits["method"] = jg.optimize.SLP(starts=4, rounds=1)
-    type_2 = jg.optimize.iterate_from_low_pressure(
-        low_pressure, bounds, mesh=mesh, torque=NOMINAL, max_relief=height, **limits
-    )
+    search = jg.optimize.SLP(starts=4, rounds=1)
+    method = iteration("low_pressure", max_relief=height, max_pressure=ALLOWED, search=search)
+    type_2 = jg.minimize(jg.Problem(mesh, NOMINAL, low_pressure, bounds), method)
     return found | {"type 2": (type_2.pinion, type_2.wheel)}
 
 

@@ -83,23 +83,19 @@ def prepare(fast=False) -> jg.Mesh:
 
 def optima(mesh: jg.Mesh, fast=False) -> dict:
     """The study's iteration: as its equation alone says, and its types 1 and 2, whose height the pressure decides."""
-    plateau = jg.optimize.iterate_transmission_error(mesh, NOMINAL, max_relief=HIGHEST)
-    type_1 = jg.optimize.iterate_transmission_error(mesh, NOMINAL, max_relief=HIGHEST, max_pressure=ALLOWED)
+    iteration = jg.optimize.TransmissionErrorIteration
+    plateau = jg.minimize(jg.Problem(mesh, NOMINAL), iteration(max_relief=HIGHEST))
+    type_1 = jg.minimize(jg.Problem(mesh, NOMINAL), iteration(max_relief=HIGHEST, max_pressure=ALLOWED))
     height = type_1.constraints["max_relief"].value  # the study has one for both
 
     def spline(x):
         relief = jg.TipRelief(x["amount"], x["length"], jg.ParabolicLinear(x["node"]))
         return relief, relief
 
-    type_2 = jg.optimize.iterate_from_low_pressure(
-        spline,
-        {"amount": (1.0, height), "length": (1.0, 3.27), "node": (0.05, 1.0)},
-        mesh=mesh,
-        torque=NOMINAL,
-        max_relief=height,
-        max_pressure=ALLOWED,
-        method=jg.optimize.SLP(starts=1 if fast else 4, rounds=1),
-    )
+    bounds = {"amount": (1.0, height), "length": (1.0, 3.27), "node": (0.05, 1.0)}
+    search = jg.optimize.SLP(starts=1 if fast else 4, rounds=1)
+    method = iteration("low_pressure", max_relief=height, max_pressure=ALLOWED, search=search)
+    type_2 = jg.minimize(jg.Problem(mesh, NOMINAL, spline, bounds), method)
     return {"equation alone": plateau, "type 1": type_1, "type 2": type_2}
 
 

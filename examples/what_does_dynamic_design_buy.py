@@ -65,17 +65,19 @@ def designs(mesh, fast=False, callback=None) -> dict:
     searched = SEARCHED[::2] if fast else SEARCHED
     search = dynamics.Dynamics(mesh_frequencies=searched, steps=STEPS, kick=1.0, **RUNS)
     loudest = jg.minimize(
-        design,
-        BOUNDS,
-        mesh=mesh,
-        torque=jg.LoadSpectrum(TORQUES),
-        objective=search.quantity("worst_dynamic_factor"),
-        measure=jg.Worst(),
+        jg.Problem(
+            mesh,
+            jg.LoadSpectrum(TORQUES),
+            design,
+            BOUNDS,
+            objective=search.quantity("worst_dynamic_factor"),
+            measure=jg.Worst(),
+        ),
         method=jg.optimize.SLP(starts=1, rounds=1, steps=7 if fast else 30, rtol=1e-3),
-        positions=None,  # K_v is none of the extremes over the positions of the mesh
+        positions=None,
         callback=callback,
     )
-    return {"static": jg.minimize(design, BOUNDS, mesh=mesh, torque=DESIGN_TORQUE), "dynamic": loudest}
+    return {"static": jg.minimize(jg.Problem(mesh, DESIGN_TORQUE, design, BOUNDS)), "dynamic": loudest}
 
 
 def judged(mesh, best, fast=False) -> dict:

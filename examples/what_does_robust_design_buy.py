@@ -32,14 +32,14 @@ def robust_optimum(file, mesh, tolerance, fast=False):
         return Search.of(file)(mesh)
     asked = file.tables["optimize"]
     return jg.minimize(
-        file.design,
-        file.bounds,
-        mesh=mesh,
-        torque=jg.LoadSpectrum(asked.torques),
-        measure=jg.CVaR(asked.level),
-        tolerance=tolerance,
-        samples=asked.manufactured // 2,
-        seed=asked.seed,
+        jg.Problem(
+            mesh,
+            jg.LoadSpectrum(asked.torques),
+            file.design,
+            file.bounds,
+            measure=jg.CVaR(asked.level),
+            manufactured=jg.ManufacturedGears(tolerance, asked.manufactured // 2, asked.seed),
+        ),
         method=jg.optimize.SLP(starts=asked.starts, steps=asked.steps),
         positions=None,
     )
@@ -51,7 +51,7 @@ def study(fast=False):
     # quick: contacts that stay at their nominal places
     mesh = file.mesh(replace(file.resolution(), slide_steps=0)) if fast else file.mesh()
     tolerance = jg.Tolerance.from_class(mesh.pair, file.tables["tolerance"].quality_class).without_lead()
-    nominal = jg.minimize(file.design, file.bounds, mesh=mesh, torque=file.torque)
+    nominal = jg.minimize(jg.Problem(mesh, file.torque, file.design, file.bounds))
     robust = robust_optimum(file, mesh, tolerance, fast)
     # reliefs of amount zero: gears without any are judged by the program of the others
     designs = {"unmodified": file.design({name: low for name, (low, _) in file.bounds.items()})}
@@ -62,11 +62,9 @@ def study(fast=False):
             jg.monte_carlo(
                 mesh,
                 factor * file.torque,
-                tolerance=tolerance,
+                jg.ManufacturedGears(tolerance, 1000 if fast else 10_000, SEED + number),
                 pinion=pinion,
                 wheel=wheel,
-                samples=1000 if fast else 10_000,
-                seed=SEED + number,
             )
             for number, factor in enumerate(FACTORS)
         ]

@@ -55,7 +55,7 @@ def kept(x):
 def study(fast=False):
     """The optimum with and without its margins."""
     resolution = jg.Resolution(positions=16 if fast else 64, pairs=4)
-    objective = jax.jit(jax.value_and_grad(lambda x: jg.smooth_peak_to_peak(curve(x, resolution), WIDTH)))
+    objective = jax.jit(jax.value_and_grad(lambda x: jg.metrics.smooth_peak_to_peak(curve(x, resolution), WIDTH)))
     ppte = jax.jit(lambda x: jg.peak_to_peak(curve(x, resolution)))
     constraint, slopes = jax.jit(kept), jax.jit(jax.jacrev(kept))
     valid = jax.jit(lambda x: jg.margins(gear_pair(x)).valid)

@@ -61,16 +61,12 @@ def settings(name, *, blocks, points=None) -> wear.Wear:
 def designs(name, mesh, fast=False, callback=None) -> dict:
     """Both optima."""
     search = settings(name, blocks=8 if fast else 20, points=17)
-    options = {
-        "mesh": mesh,
-        "torque": TORQUES[name],
-        "positions": None,  # the grid of the wear goes with them
-        "callback": callback,
-    }
-    lasting = search.quantity("mean_ppte_over_life")
+    asked = mesh, TORQUES[name], design, BOUNDS[name]
+    options = {"positions": None, "callback": callback}  # the grid of the wear goes with the positions
+    lasting = jg.Problem(*asked, objective=search.quantity("mean_ppte_over_life"))
     return {
-        DESIGNS[0]: jg.minimize(design, BOUNDS[name], **options),
-        DESIGNS[1]: jg.minimize(design, BOUNDS[name], objective=lasting, starts=1, steps=6 if fast else 15, **options),
+        DESIGNS[0]: jg.minimize(jg.Problem(*asked), **options),
+        DESIGNS[1]: jg.minimize(lasting, jg.optimize.SLP(starts=1, steps=6 if fast else 15), **options),
     }
 
 

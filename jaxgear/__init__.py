@@ -11,7 +11,7 @@ The pipeline in reading order, every step differentiable and vmappable:
     monte_carlo                 what manufacturing tolerances make of it
     solve_revolution            teeth that differ, over whole revolutions (jaxgear.revolution)
     sweep                       any number of modifications -> SweepTable
-    minimize, free_form         the best modification, by gradient and by other methods
+    Problem, minimize           the best modification, by gradient and by other methods
     dynamics                    mesh force, oscillators, steady states over the speed, orbits and their bifurcations
     wear                        the flanks over their life, worn by their own contact
     shafts                      shafts, bearings, housing: the load over the face

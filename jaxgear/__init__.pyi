@@ -47,7 +47,6 @@ from .metrics import harmonics as harmonics
 from .metrics import load_sharing as load_sharing
 from .metrics import peak_to_peak as peak_to_peak
 from .metrics import secant_stiffness as secant_stiffness
-from .metrics import smooth_peak_to_peak as smooth_peak_to_peak
 from .metrics import summary as summary
 from .microgeometry import EndRelief as EndRelief
 from .microgeometry import LeadCrowning as LeadCrowning
@@ -72,9 +71,9 @@ from .numerics import quick_jit as quick_jit
 from .optimize import Constraint as Constraint
 from .optimize import CVaR as CVaR
 from .optimize import Mean as Mean
+from .optimize import Problem as Problem
 from .optimize import Quantile as Quantile
 from .optimize import Worst as Worst
-from .optimize import free_form as free_form
 from .optimize import minimize as minimize
 from .sizing import iso_relief as iso_relief
 from .sizing import long_relief_length as long_relief_length
@@ -85,6 +84,7 @@ from .sweeps import VariantList as VariantList
 from .sweeps import monte_carlo as monte_carlo
 from .sweeps import open_sweep as open_sweep
 from .sweeps import sweep as sweep
+from .tolerance import ManufacturedGears as ManufacturedGears
 from .tolerance import Tolerance as Tolerance
 from .vocabulary import quantities as quantities
 

@@ -15,6 +15,9 @@ DOUBLE = 12  # steps from position to position in double contact, both ends of w
 BOX = {"pinion": (0.0, 40.0), "wheel": (0.0, 40.0)}  # amounts [um]
 
 
+POSED = "torque", "objective", "measure", "constraints", "manufactured"  # arguments of a problem
+
+
 class Known:
     """The mesh, the torque [N m] that deflects a single pair by DELTA0, and the length of double contact [mm]."""
 
@@ -45,14 +48,19 @@ class Known:
 
     def pareto(self, design, box, **options):
         """`jaxgear.pareto`."""
-        options = {"positions": None} | options  # the front is known at the positions of the mesh
-        return jg.optimize.pareto(design, box, mesh=self.mesh, torque=self.torque, **options)
+        # the front is known at the positions of the mesh
+        return jg.optimize.pareto(*self.posed(design, box, options), **{"positions": None} | options)
 
     def minimize(self, design, box, **options):
         """`jaxgear.minimize`, of eight start points unless a method is given."""
         # the optimum is known at the positions of the mesh
-        options = {"torque": self.torque, "positions": None} | options | ({} if "method" in options else {"starts": 8})
-        return jg.minimize(design, box, mesh=self.mesh, **options)
+        options = {"method": jg.optimize.SLP(starts=8), "positions": None} | options
+        return jg.minimize(*self.posed(design, box, options), **options)
+
+    def posed(self, design, box, options):
+        """The problem of those options that belong to one, which are taken out."""
+        own = {name: options.pop(name) for name in POSED if name in options}
+        return (jg.Problem(self.mesh, own.pop("torque", self.torque), design, box, **own),)
 
 
 def depth():

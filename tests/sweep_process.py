@@ -25,10 +25,10 @@ seen: list[tuple] = []
 gears = (jg.Gear(teeth=teeth, module=3.0, face_width=18.0) for teeth in (19, 48))
 sizes = jg.Resolution(positions=8, contact_nodes=1, pairs=2, newton_steps=6)
 jg.sweep(
+    jg.prepare(jg.GearPair(*gears), resolution=sizes),
+    50.0,
     design,
     jg.LatinHypercube({"pinion": (0.0, 20.0), "wheel": (0.0, 20.0)}, VARIANTS, seed=2),
-    mesh=jg.prepare(jg.GearPair(*gears), resolution=sizes),
-    torque=50.0,
     results=("ppte", "mean_te"),
     output=FOLDER,
     part_rows=PART_ROWS,

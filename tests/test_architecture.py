@@ -188,7 +188,6 @@ OF_ANY_TYPE = {
     "sweeps/table.py SweepTable.to_pandas": "likewise",
     "sweeps/table.py SweepTable.to_xarray": "likewise",
     "manufacture/drawn_gear.py drawn_gear": "takes the arguments of two classes, each of a type of its own",
-    "optimize/iteration.py iterate_from_low_pressure": "passes options of another function on",
     "numerics/fields.py count": "stands for the value of a field, whose annotation says the type",
     "numerics/fields.py number": "likewise",
     "numerics/fields.py result": "likewise",

@@ -31,7 +31,6 @@ from jaxgear.contact.status import Status
 from jaxgear.dynamics.mesh_tables import FILES
 from jaxgear.io import Search, first_look, load_design
 from jaxgear.io.folder import RESULT_FILES, result_folder
-from jaxgear.io.optimize_table import METHODS_WITHOUT_VARIABLES
 from jaxgear.manufacture import over_balls
 from jaxgear.metrics import Finding
 from jaxgear.microgeometry import NoModification
@@ -98,11 +97,11 @@ def analyzed(folder):
     """The involute is manufactured as a relief of no height: one program for both designs."""
     made = []  # what was asked for and found, of every design
 
-    def scatter(mesh, torque, *, pinion, wheel, **options):
+    def scatter(mesh, torque, gears, *, pinion, wheel):
         bare = jg.TipRelief(0.0, 5.0)
         pinion, wheel = (bare if isinstance(flank, NoModification) else flank for flank in (pinion, wheel))
-        found = jg.monte_carlo(mesh, torque, pinion=pinion, wheel=wheel, **options)
-        made.append(({"torque": torque, "pinion": pinion, "wheel": wheel, **options}, found))
+        found = jg.monte_carlo(mesh, torque, gears, pinion=pinion, wheel=wheel)
+        made.append(({"torque": torque, "pinion": pinion, "wheel": wheel, "manufactured": gears}, found))
         return found
 
     with pytest.MonkeyPatch.context() as patch:
@@ -857,7 +856,7 @@ def test_the_program_starts_as_a_process_of_its_own(tmp_path):
 
 
 def test_the_help_knows_every_method():
-    assert first_look.known_methods() == [*jg.optimize.METHODS, "pareto", *METHODS_WITHOUT_VARIABLES]
+    assert first_look.known_methods() == [*jg.optimize.METHODS, "pareto"]
 
 
 def test_help_and_version_need_no_file():

@@ -148,7 +148,7 @@ def test_transmission_error_taken_off_the_flanks(mesh):
 
     Pairs that carry no load outside the path of contact make it exact.
     """
-    result = jg.optimize.iterate_transmission_error(mesh, torque(mesh, 1.0))
+    result = jg.minimize(jg.Problem(mesh, torque(mesh, 1.0)), "te_iteration")
     first, second = result.iterations
     assert first.ppte / DELTA0 == pytest.approx(0.5, rel=1e-12)
     assert second.ppte / DELTA0 < 1e-9
@@ -156,7 +156,9 @@ def test_transmission_error_taken_off_the_flanks(mesh):
     np.testing.assert_allclose(result.cycle.transmission_error, DELTA0, rtol=1e-9)
     assert second.max_relief == pytest.approx(0.5 * DELTA0, rel=1e-9)
     # half of it only: both pairs give way by a quarter of delta0, and half of the variation is left
-    capped = jg.optimize.iterate_transmission_error(mesh, torque(mesh, 1.0), max_relief=0.25 * DELTA0)
+    capped = jg.minimize(
+        jg.Problem(mesh, torque(mesh, 1.0)), jg.optimize.TransmissionErrorIteration(max_relief=0.25 * DELTA0)
+    )
     assert capped.ppte / DELTA0 == pytest.approx(0.25, abs=1e-9)
 
 

@@ -11,7 +11,6 @@ import jaxgear as jg
 from jaxgear.conditions import conditions, joined, ranked, variants
 from jaxgear.metrics import Quantity
 from jaxgear.numerics.reductions import Max
-from jaxgear.optimize.problem import make_problem
 
 AMOUNT, TORQUES = 5.0, (30.0, 50.0)
 
@@ -36,13 +35,13 @@ def tolerance(mesh):
 
 
 def test_every_torque_meets_the_same_gears(mesh, tolerance):
-    judged = conditions("test", mesh, jg.LoadSpectrum(TORQUES), tolerance=tolerance, samples=3, seed=7)
-    drawn = jg.tolerance.sample_deviations(tolerance, mesh, 3, seed=7)
+    judged = conditions(mesh, jg.LoadSpectrum(TORQUES), jg.ManufacturedGears(tolerance, 3, 7))
+    drawn = jg.ManufacturedGears(tolerance, 3, 7).on(mesh)
     jax.tree.map(np.testing.assert_array_equal, judged.deviations, drawn)
     cases = judged.on(mesh)
     assert cases.count == 6 and cases.weights.tolist() == pytest.approx([1 / 6] * 6)
     for row, torque in enumerate(TORQUES):
-        alone = conditions("test", mesh, torque, tolerance=tolerance, samples=3, seed=7).on(mesh)
+        alone = conditions(mesh, torque, jg.ManufacturedGears(tolerance, 3, 7)).on(mesh)
         np.testing.assert_allclose(cases.removed[row], alone.removed[0], atol=1e-12)
     # the pitch deviations of a tooth do not depend on the load: they show that the gears are the same ones
     np.testing.assert_allclose(np.ptp(cases.removed[0] - cases.removed[1], axis=0).max(), 0.0, atol=0.5)
@@ -51,7 +50,7 @@ def test_every_torque_meets_the_same_gears(mesh, tolerance):
 def test_every_case_weighs_as_its_torque(mesh, tolerance):
     """Three parts of the time at the first torque, one at the second: so does every gear that runs under them."""
     load = jg.LoadSpectrum(TORQUES, [3.0, 1.0])
-    cases = conditions("test", mesh, load, tolerance=tolerance, samples=3, seed=7).on(mesh)
+    cases = conditions(mesh, load, jg.ManufacturedGears(tolerance, 3, 7)).on(mesh)
     torques, weights = (
         np.asarray(cases.each(lambda operating_point, removed: operating_point.torque)),
         np.asarray(cases.weights),
@@ -64,13 +63,13 @@ def test_every_case_weighs_as_its_torque(mesh, tolerance):
 @pytest.mark.slow
 def test_one_quantile_in_every_engine(tolerance):
     mesh = constant_stiffness_mesh(gear_pair(), 300.0, LINE)  # of which every program is a small one
-    made = {"tolerance": tolerance, "samples": 6, "seed": 3}
-    scatter = jg.monte_carlo(mesh, 50.0, pinion=jg.TipRelief(AMOUNT, 4.0), results=("mean_te",), **made)
+    made = jg.ManufacturedGears(tolerance, 6, 3)
+    scatter = jg.monte_carlo(mesh, 50.0, made, pinion=jg.TipRelief(AMOUNT, 4.0), results=("mean_te",))
     plan, measures = jg.VariantList(("amount",), [[AMOUNT]]), (jg.Quantile(0.95), jg.CVaR(0.5))
-    table = jg.sweep(design, plan, mesh=mesh, torque=50.0, measures=measures, **made)
+    table = jg.sweep(mesh, 50.0, design, plan, measures=measures, manufactured=made)
     assert table.results == ("ppte_um_q95", "ppte_um_cvar50")
     bounds = {"amount": (0.0, 10.0)}
-    problem = make_problem(design, bounds, mesh=mesh, torque=50.0, measure=jg.Quantile(0.95), **made)
+    problem = Problem(mesh, 50.0, design, bounds, measure=jg.Quantile(0.95), manufactured=made)
     searched = float(jax.jit(lambda x: problem.score(x).value[0])(jnp.asarray([AMOUNT / 10])))
     expected = float(hdquantiles(np.asarray(scatter.ppte), [0.95])[0])
     assert np.ptp(scatter.ppte) > 0.1
@@ -108,7 +107,7 @@ def test_a_sweep_of_geometry_load_and_flanks_is_a_loop_over_them():
 
     own = Quantity("peak", lambda cycle: cycle.transmission_error * cycle.torque, "um N m", reduction=Max())
     results = ("ppte", "contact_ratio", own, "max_relief")
-    table = jg.sweep(design, plan, mesh=mesh_of, torque=lambda v: v["torque"], results=results)
+    table = jg.sweep(mesh_of, lambda v: v["torque"], design, plan, results=results)
     np.testing.assert_array_equal(table.column("converged"), [False, True, True, False])
     assert np.isnan(table.column("ppte_um")[[0, 3]]).all()
     for row in (1, 2):
@@ -122,29 +121,26 @@ def test_a_sweep_of_geometry_load_and_flanks_is_a_loop_over_them():
 
 def test_unused_variables_are_named(mesh):
     plan = jg.Sobol({"amount": (0.0, 9.0), "torque": (10.0, 60.0), "lenght": (1.0, 2.0)}, 8, seed=0)
-    with pytest.raises(ValueError, match='^sweep: nothing depends on "torque", "lenght": use it in design'):
-        jg.sweep(design, plan, mesh=mesh, torque=50.0)
-    with pytest.raises(ValueError, match='^sweep: nothing depends on "lenght"'):
-        jg.sweep(design, plan, mesh=mesh, torque=lambda v: v["torque"])
-    with pytest.raises(ValueError, match='^minimize: nothing depends on "lenght": use it in design'):
-        jg.minimize(design, {"amount": (0.0, 9.0), "lenght": (1.0, 2.0)}, mesh=mesh, torque=50.0)
+    with pytest.raises(ValueError, match='^nothing depends on "torque", "lenght": use it in design'):
+        jg.sweep(mesh, 50.0, design, plan)
+    with pytest.raises(ValueError, match='^nothing depends on "lenght"'):
+        jg.sweep(mesh, lambda v: v["torque"], design, plan)
+    with pytest.raises(ValueError, match='^nothing depends on "lenght": use it in design'):
+        jg.minimize(jg.Problem(mesh, 50.0, design, {"amount": (0.0, 9.0), "lenght": (1.0, 2.0)}))
 
 
 def test_what_has_no_effect_is_refused(mesh):
     plan = jg.VariantList(("amount",), [[AMOUNT]])
-    for options, words in (
-        ({"measures": (jg.Mean(),)}, "sweep: measures have no effect"),
-        ({"samples": 8}, "sweep: samples = 8 has no effect without a tolerance"),
-    ):
+    for options, words in (({"measures": (jg.Mean(),)}, "measures have no effect"),):
         with pytest.raises(ValueError, match=words):
-            jg.sweep(design, plan, mesh=mesh, torque=50.0, **options)
-    with pytest.raises(ValueError, match="sweep: mesh gives GearPair, must be a Mesh"):
-        jg.sweep(design, plan, mesh=lambda v: pair(), torque=50.0)
+            jg.sweep(mesh, 50.0, design, plan, **options)
+    with pytest.raises(ValueError, match="mesh gives GearPair, must be a Mesh"):
+        jg.sweep(lambda v: pair(), 50.0, design, plan)
 
 
 def test_a_load_has_a_speed(mesh):
     load = jg.LoadSpectrum([50.0, 50.0], speeds=[1000.0, 2000.0], friction=0.05)
-    made = variants("test", design, mesh, load, names=("amount",), values=(AMOUNT,))
+    made = variants(mesh, load, design, names=("amount",), values=(AMOUNT,))
     speeds = made.cases.each(
         lambda operating_point, removed: (operating_point.speed, operating_point.torque * operating_point.friction)
     )
@@ -173,8 +169,8 @@ CAPPED = {"amount": (0.0, 5.0)}
 )
 def test_a_design_that_cannot_be_traced_is_refused_in_one_line(mesh, design, kind, said):
     for call in (
-        lambda: jg.sweep(design, jg.Sobol(CAPPED, 8, seed=0), mesh, 50.0),
-        lambda: jg.minimize(design, CAPPED, mesh, 50.0),
+        lambda: jg.sweep(mesh, 50.0, design, jg.Sobol(CAPPED, 8, seed=0)),
+        lambda: jg.minimize(jg.Problem(mesh, 50.0, design, CAPPED)),
     ):
         with pytest.raises(kind) as error:
             call()
@@ -184,16 +180,16 @@ def test_a_design_that_cannot_be_traced_is_refused_in_one_line(mesh, design, kin
 def test_a_key_error_of_the_user_is_left_alone(mesh):
     """One of a dictionary of his own that has a variable's name."""
     with pytest.raises(KeyError, match="amount"):
-        jg.sweep(lambda v: ({}["amount"], v["amount"]), jg.Sobol(CAPPED, 8, seed=0), mesh, 50.0)
+        jg.sweep(mesh, 50.0, lambda v: ({}["amount"], v["amount"]), jg.Sobol(CAPPED, 8, seed=0))
 
 
 @pytest.mark.parametrize(
     ("make", "said"),
     [
-        (lambda: jg.Sobol([("amount", 0.0, 5.0)], 8, seed=0), "Sobol: bounds is a list, must be a dict such as"),
-        (lambda: jg.Sobol({"amount": 5.0}, 8, seed=0), "Sobol: bounds of amount = 5.0 must be two numbers"),
+        (lambda: jg.Sobol([("amount", 0.0, 5.0)], 8, seed=0), "bounds is a list, must be a dict such as"),
+        (lambda: jg.Sobol({"amount": 5.0}, 8, seed=0), "bounds of amount = 5.0 must be two numbers"),
         (lambda: jg.Sobol({"amount": ("0,5", 6)}, 8, seed=0), "'0,5' must be a number, with a decimal point"),
-        (lambda: jg.sweep(None, [1.0], None, 50.0), "sweep: plan is a list, must be FullFactorial"),
+        (lambda: jg.sweep(None, 50.0, None, [1.0]), "plan is a list, must be FullFactorial"),
     ],
 )
 def test_a_plan_of_another_type_is_refused_in_one_line(make, said):

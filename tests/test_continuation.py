@@ -193,14 +193,14 @@ def test_the_gradient_of_a_flip(parametric):
 
 
 def test_what_is_no_fold_or_flip_is_refused(resonance, parametric):
-    with pytest.raises(TypeError, match="bifurcation_of: near is of type Orbit, must be a Bifurcation"):
+    with pytest.raises(TypeError, match="near is of type Orbit, must be a Bifurcation"):
         bifurcation_of(rectangular(), parametric.bifurcations[0].orbit)
     with pytest.raises(ValueError, match='start is a bifurcation of kind "fold", must be a flip'):
         followed(resonance.bifurcations[0], within=(0.05, 0.2))
     with pytest.raises(ValueError, match="direction = 'left' must be"):
         followed(resonance.bifurcations[0], within=(0.05, 0.2), direction="left")
     start = find_orbit(rectangular(), frequency(1.2), ([1.3], [0.9]), steps=STEPS)
-    with pytest.raises(ValueError, match="follow_orbits: parameter of the start = .* must be at least"):
+    with pytest.raises(ValueError, match="parameter of the start = .* must be at least"):
         followed(start, within=(1.0, 2.0))
-    with pytest.raises(ValueError, match="follow_orbits: parameter belongs to a function of it"):
+    with pytest.raises(ValueError, match="parameter belongs to a function of it"):
         followed(start, within=(0.05, 0.3), parameter=0.2)

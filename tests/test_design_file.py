@@ -807,7 +807,7 @@ def test_variables_stand_for_numbers_of_gears_pair_and_load(load):
     assert request.highest_torque == 60.0 and request.plan.size == 8
     assert file.resolution(request.highest_torque).pairs == 4  # other variants can have a larger contact ratio
     low = {name: jnp.asarray(bounds[0]) for name, bounds in file.bounds.items()}
-    assert float(file.pair(low).center_distance) == 101.4 and float(request.torque(low).torque) == 20.0
+    assert float(file.pair(low).center_distance) == 101.4 and float(request.load(low).torque) == 20.0
     for old, new, problem in (
         ("results", "torques = [30.0]\nresults", 'sweep.torques: has no effect, load.torque is "t"'),
         ("high = 0.2", "high = 3.0", "variables.x.high: 3 x module must be at least -1.5 x module and at most 2"),
@@ -849,14 +849,14 @@ results = ["max_flash_temperature"]
 def test_speed_and_friction_reach_objective_constraint_and_sweep(load):
     whole = text(pinion=RELIEF, load="speed = 1000.0\nfriction = 0.05", tail=VARIABLE + FLASH)
     file = load(whole)
-    for spectrum in (Search.of(file).options["torque"], asked_sweep(file).torque):
+    for spectrum in (Search.of(file).problem["torque"], asked_sweep(file).load):
         assert float(spectrum.speeds[0]) == 1000.0 and float(spectrum.friction) == pytest.approx(0.05)
     # a variable: every variant has its own
     variable = 'n = { low = 500.0, high = 1500.0, unit = "rpm" }\n'
     free = load(whole.replace("speed = 1000.0", 'speed = "n"').replace("[optimize]", variable + "[optimize]"))
     assert free.speed == 1000.0 and free.units["n"] == "rpm"
     request = asked_sweep(free)
-    operating_point = request.torque({"height": jnp.asarray(1.0), "n": jnp.asarray(700.0)})
+    operating_point = request.load({"height": jnp.asarray(1.0), "n": jnp.asarray(700.0)})
     assert (
         float(operating_point.speed) == 700.0
         and float(operating_point.torque) == 50.0
@@ -871,9 +871,7 @@ def test_a_sweep_of_gears_pair_and_load_solves_each_as_the_library_does(load):
     file = load(open_case())
     request = asked_sweep(file)
     mesh = file.sweep_mesh(file.resolution(request.highest_torque))
-    table = jg.sweep(
-        file.design, request.plan, mesh=mesh, torque=request.torque, results=request.results, units=file.units
-    )
+    table = jg.sweep(mesh, request.load, file.design, request.plan, results=request.results, units=file.units)
     rows = {key: table.column(key) for key in ("x", "a", "t", "mean_te_um", "converged")}
     assert table.units["t"] == "N m" and rows["converged"].all()
     for row in range(8):

@@ -304,7 +304,7 @@ def test_identification_refuses_what_it_cannot_make_dimensionless(identified):
     cycle, _ = identified
     with pytest.raises(ValueError, match="give either damping_ratio or damping"):
         from_mesh(cycle, mass=0.3)
-    with pytest.raises(ValueError, match="from_mesh: half_clearance = 0 um must be greater than 0 um"):
+    with pytest.raises(ValueError, match="half_clearance = 0 um must be greater than 0 um"):
         from_mesh(cycle, mass=0.3, damping_ratio=0.05, half_clearance=0.0)
     with pytest.raises(ValueError, match="stiffness = \"mean\" must|stiffness = 'mean' must"):
         from_mesh(cycle, mass=0.3, damping_ratio=0.05, half_clearance=40.0, stiffness="mean")
@@ -362,9 +362,9 @@ def test_flanks_take_off_what_a_cycle_relief_says():
     assert np.isclose(none, 0.0) and np.isclose(at_pitch_point, 0.0)
     assert np.isclose(both, 0.5 * (first + second)) and first + second > 0
 
-    with pytest.raises(ValueError, match="tip_relief: contact_ratio = 1.37 of the relief must be that of the pair"):
+    with pytest.raises(ValueError, match="contact_ratio = 1.37 of the relief must be that of the pair"):
         tip_relief(relief(), mesh.pair, half)
-    with pytest.raises(ValueError, match="cycle_relief: half_clearance = 0 um must be greater than 0 um"):
+    with pytest.raises(ValueError, match="half_clearance = 0 um must be greater than 0 um"):
         cycle_relief(known, mesh.pair, 0.0)
 
 

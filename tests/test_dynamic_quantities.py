@@ -14,7 +14,7 @@ from jaxgear.contact.status import Status
 from jaxgear.dynamics import DYNAMIC_QUANTITIES, KICKED, Dynamics
 from jaxgear.dynamics.runs import Run, design_runs
 from jaxgear.metrics import Analysis
-from jaxgear.optimize.problem import make_problem
+from jaxgear.optimize import Problem
 
 TORQUE = 200.0
 PLAY = -60.0  # um, so that flanks part before the coast flanks touch
@@ -135,7 +135,7 @@ def test_a_quantity_is_the_number_of_the_sweep(mesh, nearby, monkeypatch):
 def test_an_objective_is_the_number_of_the_sweep(mesh):
     """The whole chain, cycle, mesh, force and oscillator, against the steps done by hand; and its slope."""
     objectives = [SETTINGS.quantity("worst_dynamic_factor"), SETTINGS.quantity("worst_dte_rms")]
-    problem = make_problem(design, {"height": (0.0, 8.0)}, mesh=mesh, torque=TORQUE, objective=objectives)
+    problem = Problem(mesh, TORQUE, design, {"height": (0.0, 8.0)}, objective=objectives)
 
     @eqx.filter_jit
     def scored(problem, x):
@@ -197,7 +197,7 @@ def test_designs_have_one_leading_axis():
 @pytest.mark.slow
 def test_a_linearization_has_the_slopes_of_every_speed(mesh, sloped):
     objectives = [SETTINGS.quantity("worst_dynamic_factor"), SETTINGS.quantity("worst_dte_rms")]
-    problem = make_problem(design, {"height": (0.0, 8.0)}, mesh=mesh, torque=TORQUE, objective=objectives)
+    problem = Problem(mesh, TORQUE, design, {"height": (0.0, 8.0)}, objective=objectives)
     found = eqx.filter_jit(lambda problem, x: problem.linearize(x))(problem, jnp.asarray([HEIGHT / 8]))
     assert bool(found.fine)
     values, slopes, _ = sloped(HEIGHT)
@@ -213,8 +213,8 @@ def test_quantities_of_the_same_settings_share_a_sweep(mesh, monkeypatch):
     monkeypatch.setattr(Dynamics, "numbers", lambda *args: traced.append(args) or made(*args))
     objectives = [SETTINGS.quantity("worst_dynamic_factor"), SETTINGS.quantity("worst_contact_loss_share")]
     limit = jg.Constraint(SETTINGS.quantity("worst_dte_rms"), high=5.0)
-    options = {"mesh": mesh, "torque": TORQUE, "objective": objectives, "constraints": [limit]}
-    problem = make_problem(design, {"height": (0.0, 8.0)}, **options)
+    bounds = {"height": (0.0, 8.0)}
+    problem = Problem(mesh, TORQUE, design, bounds, objective=objectives, constraints=[limit])
     for times in (1, 2):  # a second trace has nothing of the first one
         eqx.filter_eval_shape(problem.score, jnp.asarray([0.3]))
         assert len(traced) == times

@@ -246,12 +246,12 @@ def test_steps_on_the_host_are_the_blocks(mesh, natural, resonant):
 @pytest.mark.parametrize(
     "options, message",
     [
-        ({"torque": TORQUE}, r"wear: dynamics needs a speed: give OperatingPoint\(torque, speed\)"),
-        ({"torque": jg.OperatingPoint(TORQUE, 0.0)}, "wear: speed with dynamics = 0 rpm must be greater than 0 rpm"),
-        ({"torque": jg.OperatingPoint(0.0, 9.0)}, "wear: torque with dynamics = 0 N m must be greater than 0 N m"),
-        ({"dynamics": None, "line_load": "dynamic"}, 'wear: line_load = "dynamic" needs dynamics'),
-        ({"line_load": "quick"}, 'wear: line_load = \'quick\' must be "static" or "dynamic"'),
-        ({"dynamics": 3.0}, "wear: dynamics is of type float, must be Dynamics"),
+        ({"torque": TORQUE}, r"dynamics needs a speed: give OperatingPoint\(torque, speed\)"),
+        ({"torque": jg.OperatingPoint(TORQUE, 0.0)}, "speed with dynamics = 0 rpm must be greater than 0 rpm"),
+        ({"torque": jg.OperatingPoint(0.0, 9.0)}, "torque with dynamics = 0 N m must be greater than 0 N m"),
+        ({"dynamics": None, "line_load": "dynamic"}, 'line_load = "dynamic" needs dynamics'),
+        ({"line_load": "quick"}, 'line_load = \'quick\' must be "static" or "dynamic"'),
+        ({"dynamics": 3.0}, "dynamics is of type float, must be Dynamics"),
     ],
 )
 def test_refuses_in_one_line(mesh, options, message):
@@ -261,12 +261,12 @@ def test_refuses_in_one_line(mesh, options, message):
 
 
 def test_settings_and_lives_without_dynamics_are_refused(resonant):
-    with pytest.raises(ValueError, match='Wear: line_load = "dynamic" needs dynamics'):
+    with pytest.raises(ValueError, match='line_load = "dynamic" needs dynamics'):
         Wear(REVOLUTIONS, COEFFICIENT, line_load="dynamic")
     with pytest.raises(ValueError, match='Wear: quantity "worn_dynamic_factor" needs dynamics'):
         Wear(REVOLUTIONS, COEFFICIENT).quantity("worn_dynamic_factor")
     life = replace(resonant, dynamic_factor=None)
-    with pytest.raises(ValueError, match='over_life: "dynamic_factor" needs a wear history with dynamics'):
+    with pytest.raises(ValueError, match='"dynamic_factor" needs a wear history with dynamics'):
         over_life(life, "dynamic_factor")
 
 

@@ -31,11 +31,11 @@ def flanks(x):
 
 
 def ppte(x, mesh):
-    return evaluate("ppte", mesh, x[-1], **flanks(x))
+    return evaluate(mesh, x[-1], "ppte", **flanks(x))
 
 
 def several(x, mesh, quantities):
-    return jnp.stack(evaluate(quantities, mesh, x[-1], **flanks(x)))
+    return jnp.stack(evaluate(mesh, x[-1], quantities, **flanks(x)))
 
 
 def of_solve(x, mesh, quantities):
@@ -90,14 +90,14 @@ def test_a_gradient_takes_little_more_than_the_value():
 
 
 def test_one_quantity_is_a_number_and_what_cannot_be_is_refused():
-    number = evaluate("ppte", mesh(), 60.0, **flanks(DESIGN))
+    number = evaluate(mesh(), 60.0, "ppte", **flanks(DESIGN))
     assert number.shape == () and float(number) == pytest.approx(float(with_slope(DESIGN, mesh())[0]), rel=1e-12)
-    with pytest.raises(ValueError, match=r'^evaluate: "pptee" is not known, did you mean "ppte"\?$'):
-        evaluate("pptee", mesh(), 60.0)
-    with pytest.raises(ValueError, match="^evaluate: quantities is empty, give at least one$"):
-        evaluate([], mesh(), 60.0)
-    with pytest.raises(TypeError, match="^evaluate: mesh is a float, must be a Mesh"):
-        evaluate("ppte", 60.0, mesh())
+    with pytest.raises(ValueError, match=r'^"pptee" is not known, did you mean "ppte"\?$'):
+        evaluate(mesh(), 60.0, "pptee")
+    with pytest.raises(ValueError, match="^quantities is empty, give at least one$"):
+        evaluate(mesh(), 60.0, [])
+    with pytest.raises(TypeError, match="^mesh is a float, must be a Mesh"):
+        evaluate(60.0, mesh(), "ppte")
 
 
 @pytest.mark.slow
@@ -108,7 +108,7 @@ def test_derivatives_by_helical_gears():
         def number(x):
             mesh = jg.prepare(pair_of(x[0], width=x[1]), resolution=SIZES)
             relief = jg.TipRelief(x[2], 3.1, jg.Parabolic())
-            return evaluate("max_line_load", mesh, 150.0, pinion=relief, wheel=relief + jg.LeadCrowning(x[2]))
+            return evaluate(mesh, 150.0, "max_line_load", pinion=relief, wheel=relief + jg.LeadCrowning(x[2]))
 
         return number
 

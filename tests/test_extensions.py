@@ -160,7 +160,7 @@ def test_a_quantity_of_a_user_is_swept_searched_limited_and_reported(known, tmp_
     mesh = jg.prepare(gear_pair(), resolution=LINE)
     plan = jg.VariantList(["amount"], [[0.0], [6.0]])
     table = jg.sweep(
-        lambda v: (jg.TipRelief(v["amount"], 4.0), None), plan, mesh=mesh, torque=50.0, results=("te_second_harmonic",)
+        mesh, 50.0, lambda v: (jg.TipRelief(v["amount"], 4.0), None), plan, results=("te_second_harmonic",)
     )
     error = np.asarray(eqx.filter_jit(lambda: jg.solve(mesh, 50.0).transmission_error)())
     expected = 2 * abs(np.fft.fft(error)[2]) / len(error)
@@ -206,8 +206,7 @@ def test_design_files_know_a_quantity_of_own_settings(traced, load):
     asked += '[optimize]\nobjective = "level"\nconstraint = [{ of = "level", high = 9.0 }]\n'
     design = load(text(**FREE_TIP, tail=f"[microphone]\ndistance = 0.5\n{asked}"))
     (result,) = asked_sweep(design).results
-    request = Search.of(design)
-    asked_for = request.options
+    asked_for = Search.of(design).problem
     (limit,) = asked_for["constraints"]
     known = {quantity.name: quantity for quantity in quantities_of_tables(design)}
     for quantity in (result, asked_for["objective"], limit.quantity, known["level"]):
@@ -223,7 +222,7 @@ def test_a_quantity_of_own_settings_is_swept_limited_and_compiled_once(traced):
 
     def swept(distance):
         results = ("ppte", Microphone(distance).quantity("level"))
-        return jg.sweep(lambda v: (jg.TipRelief(v["amount"], 4.0), None), plan, mesh=mesh, torque=50.0, results=results)
+        return jg.sweep(mesh, 50.0, lambda v: (jg.TipRelief(v["amount"], 4.0), None), plan, results=results)
 
     near = swept(0.5)
     assert near.column("level_um_per_m") == pytest.approx(2 * near.column("ppte_um"))
@@ -246,7 +245,7 @@ def test_a_quantity_of_own_settings_is_swept_limited_and_compiled_once(traced):
         Microphone(1.0).quantity("volume")
 
 
-class Scatter(Checked, jg.optimize.AbstractMethod):
+class Scatter(Checked, jg.optimize.AbstractSearch):
     """A user's own method: designs at random.
 
     Attributes:
@@ -275,8 +274,7 @@ class Scatter(Checked, jg.optimize.AbstractMethod):
 def test_a_method_of_a_user_is_given_as_an_object_or_known_by_name(load, monkeypatch):
     file = load(BY_FACTORIAL)
     mesh = file.mesh(replace(file.resolution(), positions=8))
-    options = {"mesh": mesh, "torque": 50.0, "positions": None}
-    given = jg.minimize(file.design, file.bounds, method=Scatter(5, seed=3), **options)
+    given = jg.minimize(jg.Problem(mesh, 50.0, file.design, file.bounds), Scatter(5, seed=3), positions=None)
     height = 20.0 * np.random.default_rng(3).random(5)
     assert np.abs(height - given.parameters["height"]).min() < 1e-9 and given.method == "scatter"
     monkeypatch.setitem(jg.optimize.METHODS, "scatter", Scatter)

@@ -176,15 +176,15 @@ def test_derivatives_are_central_differences():
 
 
 def test_refusals():
-    with pytest.raises(ValueError, match=r"^annex_e: torque must be given: no coupling has one$"):
+    with pytest.raises(ValueError, match=r"^torque must be given: no coupling has one$"):
         annex_e(RigidSupport(PAIR))
-    with pytest.raises(ValueError, match=r"^annex_e: torque has no effect: that of the couplings counts$"):
+    with pytest.raises(ValueError, match=r"^torque has no effect: that of the couplings counts$"):
         annex_e(support(BOX), torque=20.0)
     with pytest.raises(ValueError, match="^Misalignment: skew = 3 um needs bearing_span"):
         Misalignment(skew=3.0)
-    with pytest.raises(ValueError, match="^method_c: flank_line = 'round' must be one of none, "):
+    with pytest.raises(ValueError, match="^flank_line = 'round' must be one of none, "):
         method_c(100.0, 16.0, 1.0, 1.0, flank_line="round")
-    with pytest.raises(ValueError, match="^method_c: through-hardened flanks need endurance_limit"):
+    with pytest.raises(ValueError, match="^through-hardened flanks need endurance_limit"):
         method_c(100.0, 16.0, 1.0, 1.0, hardening="through_hardened")
-    with pytest.raises(ValueError, match='^method_c: endurance_limit has no effect on hardening = "cast_iron"$'):
+    with pytest.raises(ValueError, match='^endurance_limit has no effect on hardening = "cast_iron"$'):
         method_c(100.0, 16.0, 1.0, 1.0, hardening="cast_iron", endurance_limit=900.0)

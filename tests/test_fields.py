@@ -69,7 +69,7 @@ def test_what_is_refused(given, message):
 
 def test_what_is_hardly_meant_is_asked_about_once(monkeypatch, caplog):
     """Lengths in mm for amounts in um, moduli in GPa: they can be computed, so that they are no error."""
-    monkeypatch.setattr(fields, "_asked", set())
+    monkeypatch.setattr(fields, "_warned", set())
     for amount in (0.0, 0.1, -20.0):
         jg.TipRelief(amount, 5.0)
     assert caplog.messages == []

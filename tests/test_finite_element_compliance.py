@@ -145,7 +145,7 @@ def test_derivatives_by_what_a_table_scales_with(tabulated):
 @pytest.mark.parametrize("derivative", [jax.grad, jax.jacfwd])
 def test_derivatives_that_a_table_cannot_know_are_refused(tabulated, usual, derivative, name, value):
     key = {"shift": "profile_shift", "poisson": "poisson_ratio"}[name]
-    with pytest.raises(ValueError, match=f"^finite_element_compliance: no derivative by {key}: "):
+    with pytest.raises(ValueError, match=f"^no derivative by {key}: "):
         derivative(lambda number: jnp.sum(structure_of(tabulated, pair(**{name: number}), usual)))(value)
 
 
@@ -193,7 +193,7 @@ def test_a_thinner_tooth_is_softer_and_has_a_table_of_its_own(usual, folder):
 
 
 def test_other_gears_than_those_of_the_table(tabulated, usual):
-    with pytest.raises(ValueError, match="^finite_element_compliance: pinion teeth = 20 differs from 19 of its table"):
+    with pytest.raises(ValueError, match="^pinion teeth = 20 differs from 19 of its table"):
         prepared(pair((20, 48)), tabulated)
     with pytest.raises(ValueError, match="wheel .*bore_diameter over 2 module"):
         prepared(
@@ -226,7 +226,7 @@ def test_a_kept_table_is_the_same_and_a_damaged_one_is_made_again(folder, tmp_pa
     file.write_bytes(file.read_bytes()[:-5])
     assert eqx.tree_equal(first, jg.finite_element_compliance(gears, "stress", cache=tmp_path)) and len(made) == 2
     assert eqx.tree_equal(first, jg.finite_element_compliance(gears, "stress", cache=None)) and len(made) == 4
-    with pytest.raises(ValueError, match="^finite_element_compliance: cache = "):
+    with pytest.raises(ValueError, match="^cache = "):
         jg.finite_element_compliance(gears, "stress", cache=file / "below")
 
 

@@ -106,7 +106,7 @@ def test_derivatives_and_batches(mesh):
 
 
 def test_what_is_no_field_is_refused(mesh):
-    with pytest.raises(ValueError, match=r"flank_table: field has shape \(2, 16\), must be \(2, 3, 16\)"):
+    with pytest.raises(ValueError, match=r"field has shape \(2, 16\), must be \(2, 3, 16\)"):
         flank_table(mesh.kinematics, jnp.asarray(np.ones((2, 16))), "pinion")
-    with pytest.raises(ValueError, match="flank_table: gear = 'gear' must be"):
+    with pytest.raises(ValueError, match="gear = 'gear' must be"):
         flank_table(mesh.kinematics, jnp.asarray(np.ones((2, 3, 16))), "gear")

@@ -21,8 +21,7 @@ PAGES = [page for page in sorted(GUIDES.glob("*.md")) if "```python" in page.rea
 @pytest.fixture
 def searches_stay(monkeypatch):
     """Searches end on the mesh of the page, not on one of 512 positions, as those of the README do in its test."""
-    for search in jg.minimize, jg.optimize.free_form:
-        monkeypatch.setitem(search.__kwdefaults__, "positions", None)
+    monkeypatch.setitem(jg.minimize.__kwdefaults__, "positions", None)
 
 
 @pytest.mark.slow

@@ -249,10 +249,12 @@ def test_derivatives_by_angle_and_width_are_central_differences():
 def test_flanks_are_found_by_gradients():
     mesh = solved()[0]
     found = jg.optimize.minimize(
-        lambda x: (jg.TipRelief(x["amount"], 5.0), jg.TipRelief(x["amount"], 5.0)),
-        {"amount": (0.0, 20.0)},
-        mesh=mesh,
-        torque=TORQUE,
+        jg.Problem(
+            mesh,
+            TORQUE,
+            lambda x: (jg.TipRelief(x["amount"], 5.0), jg.TipRelief(x["amount"], 5.0)),
+            {"amount": (0.0, 20.0)},
+        )
     )
     none = jg.TipRelief(0.0, 5.0)
     unmodified = jg.solve(found.mesh, TORQUE, pinion=none, wheel=none)  # by the program that solved the optimum

@@ -14,7 +14,7 @@ import jaxgear as jg
 from jaxgear import manufacture
 from jaxgear.contact import removed_material
 from jaxgear.geometry import tooth_thickness
-from jaxgear.tolerance import Tolerance, ToleranceClass, deviated_material, sample_deviations
+from jaxgear.tolerance import Tolerance, ToleranceClass, deviated_material
 
 GEARS = {
     beta: jg.Gear(
@@ -68,7 +68,7 @@ def test_measures_go_to_those_of_spur_gears():
 def test_a_narrow_helical_gear_has_no_span():
     """Both anvils must reach the face: W_k sin(beta_b)."""
     narrow = replace(GEARS[-25.0], face_width=14.0)
-    with pytest.raises(ValueError, match=r"span: teeth = 4 takes 15.03 mm of the face, must take at most 14 mm"):
+    with pytest.raises(ValueError, match=r"teeth = 4 takes 15.03 mm of the face, must take at most 14 mm"):
         manufacture.span(narrow, 4)
     assert np.isnan(manufacture.measures(narrow).span) and np.isfinite(manufacture.measures(GEARS[-25.0]).span)
 
@@ -104,7 +104,7 @@ def test_deviations_of_helical_gears_are_those_modifications():
     sizes = replace(SIZES, slide_steps=0, contact_nodes=1)
     mesh = jg.prepare(pair_of(), resolution=sizes)
     tolerance = Tolerance.from_class(mesh.pair, 6, misalignment=5.0)
-    drawn = sample_deviations(tolerance, mesh, 2, 7)
+    drawn = ManufacturedGears(tolerance, 2, 7).on(mesh)
     one = eqx.tree_at(
         lambda of: (of.pinion.waviness, of.wheel.waviness, of.pinion.pitch, of.wheel.pitch, of.misalignment),
         jax.tree.map(lambda leaf: leaf[0], drawn),
@@ -120,10 +120,10 @@ def test_deviations_of_helical_gears_are_those_modifications():
 @pytest.mark.slow
 def test_manufactured_helical_pairs_scatter():
     mesh, nominal = solved()
-    within = {"samples": 16, "seed": 1, "tolerance": Tolerance.from_class(mesh.pair, 6)}
-    found = jg.monte_carlo(mesh, TORQUE, **within)
+    gears = ManufacturedGears(Tolerance.from_class(mesh.pair, 6), 16, 1)
+    found = jg.monte_carlo(mesh, TORQUE, gears)
     assert found.converged_share == 1.0
     assert found.nominal_ppte == pytest.approx(float(jg.peak_to_peak(nominal.transmission_error)), rel=1e-6)
     assert found.mean > found.nominal_ppte and found.std > 0.1
-    exact = jg.monte_carlo(mesh, TORQUE, **within | {"tolerance": Tolerance()})
+    exact = jg.monte_carlo(mesh, TORQUE, ManufacturedGears(Tolerance(), 16, 1))
     np.testing.assert_allclose([exact.mean, exact.std], [found.nominal_ppte, 0.0], atol=1e-9)

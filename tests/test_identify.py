@@ -44,7 +44,7 @@ def readings(torques, scale=1.005):
 
 def found(torques, **options):
     data = Measurement(*readings(torques), noise=NOISE)
-    return identify(design, PRIOR, data, mesh=mesh(), offset=10.0, **options)
+    return identify(mesh(), data, design, PRIOR, offset=10.0, **options)
 
 
 def test_a_relief_and_an_offset_are_found_where_the_model_itself_made_the_data():
@@ -56,7 +56,7 @@ def test_a_relief_and_an_offset_are_found_where_the_model_itself_made_the_data()
     true = solve_case(meshed, jnp.asarray(TORQUES[1]), *relief({"pinion": jnp.asarray(9.0)})).transmission_error
     data = Measurement(meshed.phase, np.full(16, TORQUES[1]), true + OFFSET, noise=1e-6)
     result = identify(
-        relief, {"pinion": PRIOR["pinion"]}, data, mesh=meshed, torque_scale=None, offset=10.0, model_error=0.0
+        meshed, data, relief, {"pinion": PRIOR["pinion"]}, torque_scale=None, offset=10.0, model_error=0.0
     )
     assert result.converged and result.names == ("pinion", "offset") and not result.not_told()
     np.testing.assert_allclose(result.estimate, [9.0, OFFSET], atol=1e-6)
@@ -112,7 +112,7 @@ def test_true_values_lie_within_two_deviations_where_finite_elements_made_the_da
     def estimates(readings):
         def one(reading):
             data = Measurement(phase, torque, reading, noise=NOISE)
-            found = identify(reliefs, prior, data, mesh=mesh(), offset=5.0)
+            found = identify(mesh(), data, reliefs, prior, offset=5.0)
             return found.estimate, found.deviation, found.converged
 
         return jax.lax.map(one, readings, batch_size=5)
@@ -129,7 +129,7 @@ def test_single_precision_finds_what_double_precision_finds():
 
     given = jax.tree.map(lambda leaf: leaf.astype("float32") if eqx.is_inexact_array(leaf) else leaf, mesh())
     data = Measurement(*readings(TORQUES), noise=NOISE)
-    result, exact = identify(single, PRIOR, data, mesh=given, offset=10.0), found(TORQUES)
+    result, exact = identify(given, data, single, PRIOR, offset=10.0), found(TORQUES)
     assert result.estimate.dtype == "float32" and result.converged
     np.testing.assert_allclose(result.estimate, exact.estimate, atol=0.02 * np.min(exact.deviation[:2]))
     np.testing.assert_allclose(result.deviation, exact.deviation, rtol=0.01)
@@ -147,7 +147,7 @@ def test_lead_modifications_are_found_exactly_without_noise():
     torques, made = (60.0, 120.0), flanks(dict(zip(true, map(jnp.asarray, true.values()))))
     value = [solve_case(meshed, jnp.asarray(torque), *made).transmission_error for torque in torques]
     data = Measurement(np.tile(meshed.phase, 2), np.repeat(torques, 8), jnp.concatenate(value), noise=1e-6)
-    result = identify(flanks, prior, data, mesh=meshed, torque_scale=None, model_error=0.0)
+    result = identify(meshed, data, flanks, prior, torque_scale=None, model_error=0.0)
     assert result.converged
     np.testing.assert_allclose(result.estimate, list(true.values()), atol=1e-6)
 
@@ -156,9 +156,9 @@ def test_lead_modifications_are_found_exactly_without_noise():
 def test_an_error_of_the_model_widens_the_deviations():
     phase, torque, value = readings(TORQUES)
     error = 0.5 * torque / max(TORQUES) * np.cos(2 * np.pi * phase)
-    options = {"mesh": mesh(), "offset": 10.0, "model_error": 0.0}
-    right = identify(design, PRIOR, Measurement(phase, torque, value, noise=NOISE), **options)
-    wrong = identify(design, PRIOR, Measurement(phase, torque, value + error, noise=NOISE), **options)
+    options = {"design": design, "prior": PRIOR, "offset": 10.0, "model_error": 0.0}
+    right = identify(mesh(), Measurement(phase, torque, value, noise=NOISE), **options)
+    wrong = identify(mesh(), Measurement(phase, torque, value + error, noise=NOISE), **options)
     assert wrong.model_error > 2 * right.model_error
     assert np.all(wrong.deviation[:2] > 1.2 * right.deviation[:2])
 
@@ -167,7 +167,7 @@ def test_an_error_of_the_model_widens_the_deviations():
 def test_repeats_tell_the_noise():
     phase, torque, value = (np.tile(column, 30) for column in readings(TORQUES[:1]))
     value = value + NOISE * np.random.default_rng(2).standard_normal(len(value))
-    result = identify(design, PRIOR, Measurement(phase, torque, value), mesh=mesh(), offset=10.0, steps=1)
+    result = identify(mesh(), Measurement(phase, torque, value), design, PRIOR, offset=10.0, steps=1)
     np.testing.assert_allclose(result.noise, NOISE / np.sqrt(30), rtol=0.1)
 
 
@@ -184,7 +184,7 @@ def test_all_pitch_deviations_are_told_once_all_teeth_have_met():
 
     def told(rows):
         data = Measurement(found.phase[:rows], np.full(rows, 60.0), value[:rows], noise=NOISE)
-        result = identify(design, PRIOR, data, mesh=mesh, offset=10.0, single_pitch=(2.5, 2.5))
+        result = identify(mesh, data, design, PRIOR, offset=10.0, single_pitch=(2.5, 2.5))
         every = np.concatenate([np.stack(result.single_pitch[gear]) for gear in ("pinion", "wheel")], axis=1)
         assert result.converged and np.mean(np.abs(every[0] - np.concatenate(single)) < 2 * every[1]) > 0.85
         assert abs(sum(result.single_pitch["pinion"][0])) < 1e-9
@@ -214,7 +214,7 @@ def test_pitch_deviations_need_whole_revolutions_and_an_offset(options, says):
     columns = np.tile(np.arange(16) / 16, 3), np.repeat(TORQUES, 16), np.arange(48.0)
     data = Measurement(given.pop("phase")(columns[0]), *columns[1:], noise=NOISE)
     with pytest.raises(ValueError, match=says):
-        identify(design, given.pop("prior"), data, mesh=mesh(), **given)
+        identify(mesh(), data, design, given.pop("prior"), **given)
 
 
 @pytest.mark.parametrize(
@@ -251,7 +251,7 @@ def test_impossible_questions_are_refused(options, says):
     given = {"prior": PRIOR, "noise": NOISE, "steps": 3, **options}
     data = Measurement(*GOOD.values(), noise=given["noise"])
     with pytest.raises(ValueError, match=says):
-        identify(design, given["prior"], data, mesh=mesh(), steps=given["steps"])
+        identify(mesh(), data, design, given["prior"], steps=given["steps"])
 
 
 def rows(columns):

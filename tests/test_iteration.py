@@ -22,18 +22,24 @@ def mesh():
     return jg.prepare(pair, resolution=TWO_PAIRS)
 
 
+def iterated(mesh, *, torque=TORQUE, positions=POSITIONS, callback=None, **options):
+    method = jg.optimize.TransmissionErrorIteration(**options)
+    return jg.minimize(jg.Problem(mesh, torque), method, positions=positions, callback=callback)
+
+
 @pytest.fixture(scope="module")
 def nominal(mesh):
     """From the nominal involute, and what was reported on the way."""
     looks = []
-    return jg.optimize.iterate_transmission_error(mesh, TORQUE, callback=lambda *args: looks.append(args)), looks
+    return iterated(mesh, callback=lambda *args: looks.append(args)), looks
 
 
 @pytest.fixture(scope="module")
 def relieved(mesh):
     """From a tip relief of the form that the study's second type starts with: a parabola that goes on straight."""
     tip = jg.TipRelief(7.0, 3.27, jg.ParabolicLinear(0.5))
-    return jg.optimize.iterate_transmission_error(mesh, TORQUE, pinion=tip, wheel=tip)
+    problem = jg.Problem(mesh, TORQUE, lambda variables: (tip, tip))
+    return jg.minimize(problem, jg.optimize.TransmissionErrorIteration(start="given"))
 
 
 def test_five_steps_take_three_quarters_off(nominal):
@@ -107,7 +113,7 @@ def test_equal_gears_get_equal_flanks(mesh, nominal):
 
 def test_the_largest_relief_is_kept_in_every_state(mesh, nominal):
     result, _ = nominal
-    capped = jg.optimize.iterate_transmission_error(mesh, TORQUE, max_relief=2.0)
+    capped = iterated(mesh, max_relief=2.0)
     assert max(state.max_relief for state in capped.iterations) == pytest.approx(2.0, abs=1e-9)
     assert capped.constraints["max_relief"].value <= 2.0 + 1e-9
     assert result.ppte < capped.ppte < 0.75 * capped.iterations[0].ppte
@@ -130,7 +136,7 @@ def test_a_relief_to_start_from_also_softens_the_entry(nominal, relieved):
 @pytest.fixture(scope="module")
 def slanted(mesh):
     """Within 2 GPa, what the study allows: the height at the tip is left to the pressure."""
-    return jg.optimize.iterate_transmission_error(mesh, TORQUE, max_relief=12.0, max_pressure=2000.0, positions=None)
+    return iterated(mesh, max_relief=12.0, max_pressure=2000.0, positions=None)
 
 
 def test_a_relief_that_rises_to_the_tip_is_as_level_and_keeps_the_tip_edges_out(mesh, nominal, slanted):
@@ -159,8 +165,7 @@ def test_the_limit_of_the_pressure_is_kept_between_the_positions(mesh):
     limit, count = 2430.0, mesh.resolution.positions
     fine = parts(jg.prepare(mesh.pair, resolution=replace(mesh.resolution, positions=4 * POSITIONS)), count)
     judged, short = (
-        jg.optimize.iterate_transmission_error(mesh, TORQUE, max_relief=12.0, max_pressure=limit, positions=positions)
-        for positions in (POSITIONS, None)
+        iterated(mesh, max_relief=12.0, max_pressure=limit, positions=positions) for positions in (POSITIONS, None)
     )
 
     def largest(found):
@@ -174,14 +179,14 @@ def test_the_limit_of_the_pressure_is_kept_between_the_positions(mesh):
 @pytest.mark.slow
 def test_a_limit_of_the_pressure_that_holds_anyway_changes_nothing(nominal, mesh):
     result, _ = nominal
-    free = jg.optimize.iterate_transmission_error(mesh, TORQUE, max_pressure=1e5)
+    free = iterated(mesh, max_pressure=1e5)
     assert [state.ppte for state in free.iterations] == [state.ppte for state in result.iterations]
     assert free.evaluations == result.evaluations
 
 
 def test_a_limit_of_the_pressure_that_no_slant_keeps_is_no_success(mesh):
     """With 2 um at the tips the edges dig in however the relief is spread."""
-    low = jg.optimize.iterate_transmission_error(mesh, TORQUE, max_relief=2.0, max_pressure=2000.0, steps=1)
+    low = iterated(mesh, max_relief=2.0, max_pressure=2000.0, steps=1)
     limit = low.constraints["max_contact_pressure"]
     assert not low.feasible and not limit.kept and "MPa, NOT MET: at most 2000" in str(limit)
     assert low.violation == pytest.approx(limit.value / 2000.0 - 1) and low.violation > 0.5
@@ -190,11 +195,11 @@ def test_a_limit_of_the_pressure_that_no_slant_keeps_is_no_success(mesh):
 
 def test_a_loose_tolerance_ends_early(mesh, nominal):
     result, _ = nominal
-    hasty = jg.optimize.iterate_transmission_error(mesh, TORQUE, rtol=20.0)
+    hasty = iterated(mesh, rtol=20.0)
     assert len(hasty.iterations) < len(result.iterations)
     last = hasty.iterations[-1]
     assert last.ppte - last.limit <= 20.0 * last.limit
-    assert jg.optimize.iterate_transmission_error(mesh, TORQUE, steps=1).evaluations == 2
+    assert iterated(mesh, steps=1).evaluations == 2
 
 
 @pytest.mark.parametrize(
@@ -211,4 +216,4 @@ def test_a_loose_tolerance_ends_early(mesh, nominal):
 )
 def test_refuses_numbers_outside_their_range(mesh, torque, options, words):
     with pytest.raises(ValueError, match=words):
-        jg.optimize.iterate_transmission_error(mesh, torque, **options)
+        iterated(mesh, torque=torque, **options)

@@ -44,9 +44,9 @@ def test_traced_amounts_are_refused_too(mesh):
 @pytest.mark.parametrize(
     "call",
     [
-        lambda mesh: jg.minimize(crowned, BOUNDS, mesh=mesh, torque=50.0),
-        lambda mesh: jg.sweep(crowned, jg.FullFactorial(BOUNDS, 3), mesh=mesh, torque=50.0),
-        lambda mesh: jg.monte_carlo(mesh, 50.0, tolerance=jg.Tolerance(), samples=2, pinion=LEADS[0]),
+        lambda mesh: jg.minimize(jg.Problem(mesh, 50.0, crowned, BOUNDS)),
+        lambda mesh: jg.sweep(mesh, 50.0, crowned, jg.FullFactorial(BOUNDS, 3)),
+        lambda mesh: jg.monte_carlo(mesh, 50.0, jg.ManufacturedGears(jg.Tolerance(), 2), pinion=LEADS[0]),
     ],
     ids=["minimize", "sweep", "monte_carlo"],
 )

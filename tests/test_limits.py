@@ -14,7 +14,6 @@ from jaxgear.metrics import Lubricant, Strength
 from jaxgear.optimize import SLP, Genetic, Pareto, refine, verdict
 from jaxgear.optimize.goal import FEASIBLE, counted
 from jaxgear.optimize.linear_model import Linearizer
-from jaxgear.optimize.problem import make_problem
 from jaxgear.optimize.refine import at_more_positions, fine_enough
 from jaxgear.optimize.search import Record, scores
 
@@ -45,12 +44,14 @@ def test_a_search_that_meets_no_feasible_design_seeks_one(one_program):
 
     def least(limit):
         return jg.minimize(
-            design,
-            {"amount": (0.0, 30.0), "length": (1.0, 5.0)},
-            mesh=mesh,
-            torque=50.0,
-            objective="max_flank_pressure",
-            constraints=[jg.Constraint("ppte", high=limit)],
+            jg.Problem(
+                mesh,
+                50.0,
+                design,
+                {"amount": (0.0, 30.0), "length": (1.0, 5.0)},
+                objective="max_flank_pressure",
+                constraints=[jg.Constraint("ppte", high=limit)],
+            ),
             method=Genetic(population=4, generations=1),
             positions=None,
         )
@@ -101,11 +102,11 @@ def test_limits_beside_an_objective_that_is_no_extreme_are_judged_at_four_times_
     """Its programs know no mesh half a position later; the largest pressure lies between twice the positions."""
     few = replace(LINE, positions=8)
     limit = jg.Constraint("max_flank_pressure", high=500.0)
-    posed = make_problem(
+    posed = Problem(
+        jg.prepare(gear_pair(), resolution=few),
+        50.0,
         design,
         {"amount": (0.0, 30.0), "length": (1.0, 5.0)},
-        mesh=jg.prepare(gear_pair(), resolution=few),
-        torque=50.0,
         objective="effective_contact_ratio",
         constraints=[limit],
     )
@@ -131,12 +132,14 @@ def test_limits_of_a_front_hold_on_a_mesh_of_four_times_the_positions():
     def largest(positions):
         """Of all designs, relative to the limit; and the front."""
         front = jg.optimize.pareto(
-            design,
-            {"amount": (0.0, 30.0), "length": (1.0, 5.0)},
-            mesh=mesh,
-            torque=50.0,
-            objectives=names,
-            constraints=[jg.Constraint("max_flank_pressure", high=limit)],
+            jg.Problem(
+                mesh,
+                50.0,
+                design,
+                {"amount": (0.0, 30.0), "length": (1.0, 5.0)},
+                objective=names,
+                constraints=[jg.Constraint("max_flank_pressure", high=limit)],
+            ),
             method=Pareto(points=4, steps=10),
             positions=positions,
         )
@@ -169,14 +172,16 @@ def test_least_power_loss_within_limits_of_noise_and_root_safety():
 
     ppte, least = worth({"amount": 16.0, "length": 3.6})
     found = jg.minimize(
-        design,
-        {"amount": (0.0, 40.0), "length": (1.0, 4.5)},
-        mesh=mesh,
-        torque=load,
-        objective=oil.quantity("loss_power"),
-        constraints=[jg.Constraint("ppte", high=1.01 * ppte), jg.Constraint(safety, low=0.99 * least)],
+        jg.Problem(
+            mesh,
+            load,
+            design,
+            {"amount": (0.0, 40.0), "length": (1.0, 4.5)},
+            objective=oil.quantity("loss_power"),
+            constraints=[jg.Constraint("ppte", high=1.01 * ppte), jg.Constraint(safety, low=0.99 * least)],
+        ),
         method=SLP(starts=2, rounds=1, steps=10),
-        positions=64,  # as many as the mesh has: one program linearizes on both
+        positions=64,
     )
     assert found.feasible and all(limit.kept for limit in found.constraints.values())
     noise, safe = worth(found.parameters)

@@ -15,7 +15,7 @@ from jaxgear.numerics.reductions import Range
 from jaxgear.optimize.goal import FEASIBLE
 from jaxgear.optimize.linear_model import PENALTY, LinearModel
 from jaxgear.optimize.linearization import Linearization, Pieces
-from jaxgear.optimize.problem import Roughness, make_problem
+from jaxgear.optimize.problem import Problem, Roughness
 from jaxgear.tolerance import GearTolerance
 
 SLOW = pytest.mark.slow
@@ -31,8 +31,8 @@ def mesh():
 
 
 def problem_of(mesh, loads=TORQUES, objective="ppte", constraints=(), **deviations):
-    given = {"torque": jg.LoadSpectrum(loads), "objective": objective, "constraints": constraints}
-    return make_problem(power_reliefs, POWER_BOX, mesh=mesh, **given, **deviations)
+    given = {"objective": objective, "constraints": constraints, **deviations}
+    return Problem(mesh, jg.LoadSpectrum(loads), power_reliefs, POWER_BOX, **given)
 
 
 @eqx.filter_jit

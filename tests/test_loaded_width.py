@@ -12,7 +12,6 @@ import jaxgear as jg
 from benchmarks import cases
 from jaxgear.contact import RemovedMaterial, removed_material
 from jaxgear.contact.slide import loaded_material, slid_material
-from jaxgear.optimize.problem import make_problem
 
 CASE = cases.Case("L", "stress", 300.0, "linshort")  # a steep relief on stub teeth
 TORQUE, AMOUNT, LENGTH = CASE.torque, 15.0, 1.2
@@ -150,9 +149,7 @@ def test_batches_are_their_members(batch, cycle):
 @pytest.mark.slow
 def test_slopes_of_a_linearization_are_those_of_the_curve(mesh):
     """One gradient of the contact serves all positions: widths depend on the loads at their own position alone."""
-    problem = make_problem(
-        lambda x: tuple(reliefs(x["amount"]).values()), {"amount": (10.0, 20.0)}, mesh=mesh, torque=TORQUE
-    )
+    problem = Problem(mesh, TORQUE, lambda x: tuple(reliefs(x["amount"]).values()), {"amount": (10.0, 20.0)})
     (pieces,) = problem.linearize(jnp.asarray([0.5])).objectives
     slope = jax.jacfwd(lambda amount: error(mesh, amount, TORQUE))(15.0)
     np.testing.assert_allclose(pieces.slope[0, :, 0], 10 * slope, rtol=1e-8, atol=1e-10)

@@ -395,10 +395,10 @@ def test_the_mean_of_damage_over_a_spectrum_is_the_damage_sum():
     named = STRENGTH.quantity("pinion_pitting_damage")
     load = jg.LoadSpectrum([50.0, 100.0], [3.0, 1.0])
     found = jg.sweep(
+        mesh,
+        load,
         lambda x: (jg.TipRelief(x["amount"], 3.0), None),
         jg.FullFactorial({"amount": (0.0, 5.0)}, 2),
-        mesh=mesh,
-        torque=load,
         results=(named,),
     )
     low = float(named(jg.solve(mesh, 50.0)))

@@ -150,7 +150,7 @@ def test_what_is_wrong_in_the_file_of_the_oil_names_that_file(load, tmp_path):
 
 def test_a_constraint_and_a_column_need_their_table(load):
     design = load(PAIR + OIL + STRENGTH + RELIEF)
-    (constraint,) = Search.of(design).options["constraints"]
+    (constraint,) = Search.of(design).problem["constraints"]
     assert constraint.quantity == design.tables["lubricant"].quantity("scuffing_safety")
     assert asked_sweep(design).results[2] == design.tables["strength"].quantity("pinion_root_safety")
     for text, message in (

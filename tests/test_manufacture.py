@@ -327,7 +327,7 @@ def test_a_batch_is_fitted_as_one_by_one(side):
 
 
 def test_what_no_spline_is(side):
-    with pytest.raises(ValueError, match=r"wheel_spline: degree = 4 must be 2 or 3"):
+    with pytest.raises(ValueError, match=r"degree = 4 must be 2 or 3"):
         wheel_spline(side, jg.NoModification(), degree=4)
     with pytest.raises(ValueError, match="criterion = \"l1\" must be|criterion = 'l1' must be"):
         wheel_spline(side, jg.NoModification(), criterion="l1")
@@ -352,29 +352,29 @@ def compilations():
 @pytest.mark.parametrize(
     ("call", "problem"),
     [
-        (lambda s: wheel_spline(s, NONE, node=12.0), "wheel_spline: node = 12 mm must be at least 19.5"),
+        (lambda s: wheel_spline(s, NONE, node=12.0), "node = 12 mm must be at least 19.5"),
         (
             lambda s: wheel_spline(s, NONE, node=31.5),
             "node = 31.5 mm must be .* at most 31.1",
         ),
-        (lambda s: relief_start(s, NONE, -1.0), "relief_start: threshold = -1 um must be at least 0 um"),
+        (lambda s: relief_start(s, NONE, -1.0), "threshold = -1 um must be at least 0 um"),
         (
             lambda s: manufacture.space_flank(s, NONE, points=1),
             "points = 1 must be a whole number",
         ),
-        (lambda s: manufacture.run_out(s, 3.0), "run_out: radius = 3 mm must be greater than 6.0.* mm"),
+        (lambda s: manufacture.run_out(s, 3.0), "radius = 3 mm must be greater than 6.0.* mm"),
         (
             lambda s: manufacture.largest_wheel_radius(s, 0.0),
             "gap = 0 mm must be greater than 6.03545 mm",
         ),
         (lambda s: manufacture.smallest_wheel_radius(s, -1.0), "flange_radius = -1 mm must be at least 0 mm"),
-        (lambda s: manufacture.reference_volumes(s, -6.0), "reference_volumes: amount = -6 um must be at least 0 um"),
+        (lambda s: manufacture.reference_volumes(s, -6.0), "amount = -6 um must be at least 0 um"),
         (
             lambda s: manufacture.ground_volume(s, NONE, stock=-1.0),
             "stock = -1 um must be at least 0 um",
         ),
-        (lambda s: manufacture.span(s.gear, 2.5), "span: teeth = 2.5 must be a whole number of at least 1"),
-        (lambda s: manufacture.span(s.gear, 51), "span: teeth = 51 must be at most 50"),
+        (lambda s: manufacture.span(s.gear, 2.5), "teeth = 2.5 must be a whole number of at least 1"),
+        (lambda s: manufacture.span(s.gear, 51), "teeth = 51 must be at most 50"),
     ],
 )
 def test_what_cannot_be_meant_is_refused(side, call, problem):
@@ -472,7 +472,7 @@ def test_reference_volumes_at_high_contact_ratio():
     assert float(found.linear_from_fewest_pairs) == pytest.approx(line, rel=1e-3)
     assert float(found.parabolic_from_fewest_pairs) < float(found.linear_from_fewest_pairs)
     short = replace(side, start_roll_length=side.tip_roll_length - 0.9 * gear.base_pitch)
-    with pytest.raises(ValueError, match="reference_volumes: contact ratio = 0.9 must be at least 1"):
+    with pytest.raises(ValueError, match="contact ratio = 0.9 must be at least 1"):
         manufacture.reference_volumes(short, 6.0)
 
 
@@ -528,11 +528,11 @@ def test_an_optimizer_keeps_to_what_the_wheel_grinds(moving):
         return relief, relief
 
     bounds = {"amount": (2.0, 12.0), "length": (2.0, 6.0), "exponent": (1.0, 4.0)}
-    options = {"mesh": mesh, "torque": 200.0, "starts": 1, "steps": 12, "positions": None}
-    free = jg.minimize(design, bounds, **options)
+    posed, search = (mesh, 200.0, design, bounds), jg.optimize.SLP(starts=1, steps=12)
+    free = jg.minimize(jg.Problem(*posed), search, positions=None)
     limit = 0.25 * float(jg.quantities["pinion_quadratic_deviation"](free.cycle))
     limits = [jg.Constraint(f"{gear}_quadratic_deviation", high=limit) for gear in ("pinion", "wheel")]
-    held = jg.minimize(design, bounds, constraints=limits, **options)
+    held = jg.minimize(jg.Problem(*posed, constraints=limits), search, positions=None)
     for gear in ("pinion", "wheel"):
         assert float(jg.quantities[f"{gear}_quadratic_deviation"](held.cycle)) <= 1.01 * limit
     assert free.ppte <= held.ppte < float(jg.peak_to_peak(jg.solve(mesh, 200.0).transmission_error))

@@ -341,7 +341,7 @@ def test_a_side_brings_its_base_radius(side, tmp_path):
     lines = [f"{angle},{design}" for angle, design in zip(trace.roll_angle, trace.design)]
     path = written(tmp_path, "\n".join(["roll_angle_deg,design_um", *lines]))
     np.testing.assert_allclose(io.read_flank(path, side=side).position, trace.roll_length, rtol=1e-9)
-    with pytest.raises(ValueError, match="read_flank: base_radius = 70 mm has no effect beside side"):
+    with pytest.raises(ValueError, match="base_radius = 70 mm has no effect beside side"):
         io.read_flank(path, side=side, base_radius=70.0)
 
 

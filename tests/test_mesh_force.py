@@ -287,14 +287,14 @@ def test_simpler_models_have_the_static_transmission_error_of_their_torque(mesh,
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        ({"torque": 0.0}, "mesh_force: torque = 0 N m must be greater than 0 N m"),
-        ({"levels": 2}, "mesh_force: levels = 2 must be a whole number of at least 4"),
-        ({"compliance": -1.0}, "mesh_force: compliance = -1 um/N must be at least 0 um/N"),
-        ({"reach": 0.5}, "mesh_force: reach = 0.5 must be at least 1"),
-        ({"model": "exact"}, "mesh_force: model = 'exact' must be one of \"map\""),
+        ({"torque": 0.0}, "torque = 0 N m must be greater than 0 N m"),
+        ({"levels": 2}, "levels = 2 must be a whole number of at least 4"),
+        ({"compliance": -1.0}, "compliance = -1 um/N must be at least 0 um/N"),
+        ({"reach": 0.5}, "reach = 0.5 must be at least 1"),
+        ({"model": "exact"}, "model = 'exact' must be one of \"map\""),
         (
             {"pinion": jg.TabulatedProfile([0.0, 99.0], [-50.0, -50.0])},
-            "mesh_force: the clearance between drive and coast flanks = ",
+            "the clearance between drive and coast flanks = ",
         ),
     ],
 )

@@ -115,7 +115,7 @@ def test_peak_to_peak_does_not_hide_a_failure():
 
 
 def test_smooth_peak_to_peak_rises_to_the_true_one():
-    curve, smooth = np.sin(2 * np.pi * np.arange(64.0) / 64.0), jax.jit(jg.smooth_peak_to_peak)
+    curve, smooth = np.sin(2 * np.pi * np.arange(64.0) / 64.0), jax.jit(jg.metrics.smooth_peak_to_peak)
     values = [float(smooth(curve, width)) for width in (1.0, 0.1, 0.01, 0.001)]
     assert np.all(np.diff(values) > 0)
     assert values[-1] == pytest.approx(2.0, abs=0.01)

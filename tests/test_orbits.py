@@ -226,13 +226,13 @@ def test_the_worst_of_a_band_has_the_gradient_of_its_orbits():
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        ({"mesh_frequency": 0.0}, "find_orbit: mesh_frequency = 0 Hz must be greater than 0 Hz"),
-        ({"mesh_frequency": [1.0, 2.0]}, "find_orbit: mesh_frequency has shape"),
-        ({"start": ([1.0, 2.0], [0.0])}, "find_orbit: displacements of start have shape"),
-        ({"start": 1.0}, "find_orbit: start must be displacements and velocities"),
-        ({"periods": 0}, "find_orbit: periods = 0 must be a whole number of at least 1"),
-        ({"steps": 1}, "find_orbit: steps = 1 must be a whole number of at least 2"),
-        ({"steps": jnp.array([0.0, 0.5, 0.9])}, "find_orbit: nodes of steps must increase from 0 to 1"),
+        ({"mesh_frequency": 0.0}, "mesh_frequency = 0 Hz must be greater than 0 Hz"),
+        ({"mesh_frequency": [1.0, 2.0]}, "mesh_frequency has shape"),
+        ({"start": ([1.0, 2.0], [0.0])}, "displacements of start have shape"),
+        ({"start": 1.0}, "start must be displacements and velocities"),
+        ({"periods": 0}, "periods = 0 must be a whole number of at least 1"),
+        ({"steps": 1}, "steps = 1 must be a whole number of at least 2"),
+        ({"steps": jnp.array([0.0, 0.5, 0.9])}, "nodes of steps must increase from 0 to 1"),
     ],
 )
 def test_what_cannot_be_is_refused_in_one_line(given, message):
@@ -243,5 +243,5 @@ def test_what_cannot_be_is_refused_in_one_line(given, message):
 
 
 def test_something_else_than_an_oscillator_is_refused():
-    with pytest.raises(TypeError, match="find_orbit: oscillator is of type int"):
+    with pytest.raises(TypeError, match="oscillator is of type int"):
         find_orbit(3, 0.1, NEAR)

@@ -18,7 +18,7 @@ def known():
 @pytest.fixture(scope="module")
 def searched(known):
     """PPTE against the material to grind off."""
-    return known.pareto(known.parabolas, BOX, objectives=VOLUME, method=jg.optimize.Pareto(points=12))
+    return known.pareto(known.parabolas, BOX, objective=VOLUME, method=jg.optimize.Pareto(points=12))
 
 
 @pytest.fixture(scope="module")
@@ -113,7 +113,7 @@ def three_within(known, most, **options):
     """A front of three objectives, the pinion's relief at most so much larger than the wheel's [um]."""
     limit = jg.Constraint({"pinion": 1.0, "wheel": -1.0}, high=most)
     method = jg.optimize.Pareto(points=12, **options)
-    return known.pareto(known.parabolas, BOX, objectives=(*VOLUME, "max_relief"), constraints=[limit], method=method)
+    return known.pareto(known.parabolas, BOX, objective=(*VOLUME, "max_relief"), constraints=[limit], method=method)
 
 
 @pytest.mark.slow
@@ -132,7 +132,7 @@ def test_three_objectives_within_a_limit(known, volume_per_amount):
 @pytest.mark.slow
 def test_four_objectives(known):
     names = ("ppte", "removed_volume", "max_relief", "mesh_loss_factor")
-    front = known.pareto(known.parabolas, BOX, objectives=names, method=jg.optimize.Pareto(points=8, steps=5))
+    front = known.pareto(known.parabolas, BOX, objective=names, method=jg.optimize.Pareto(points=8, steps=5))
     assert front.objectives == names
     assert front.values.shape[1] == 4 and np.isfinite(front.values).all()
     assert not dominated(front.values).any()
@@ -147,9 +147,10 @@ def test_limits_that_no_design_keeps(known):
 def test_a_front_without_a_solved_design_says_why(known):
     broken = eqx.tree_at(lambda m: m.structure, known.mesh, np.full(known.mesh.structure.shape, np.nan))
     method = jg.optimize.Pareto(points=4, steps=2)
-    options = {"objectives": VOLUME, "method": method, "positions": None}
     with pytest.raises(RuntimeError, match="designs tried: the iteration did not converge: raise newton_steps"):
-        jg.optimize.pareto(known.parabolas, BOX, mesh=broken, torque=known.torque, **options)
+        jg.optimize.pareto(
+            jg.Problem(broken, known.torque, known.parabolas, BOX, objective=VOLUME), method, positions=None
+        )
 
 
 @pytest.mark.parametrize(("options", "words"), [({"points": 1}, "points = 1"), ({"steps": 0}, "steps = 0")])

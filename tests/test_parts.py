@@ -11,7 +11,6 @@ from catalogue import FACE, LINE, gear_pair, prepare
 import jaxgear as jg
 from jaxgear.contact.mesh import half_way, parts
 from jaxgear.optimize.linear_model import Linearizer
-from jaxgear.optimize.problem import make_problem
 
 TORQUE, COARSE, COUNT = 50.0, 8, LINE.positions // 8
 
@@ -106,7 +105,7 @@ def problem_on(mesh, objective="ppte"):
         return relief, relief
 
     limit = jg.Constraint("max_flank_pressure", high=900.0)
-    return make_problem(design, BOX, mesh=mesh, torque=TORQUE, objective=objective, constraints=[limit])
+    return Problem(mesh, TORQUE, design, BOX, objective=objective, constraints=[limit])
 
 
 @pytest.fixture(scope="module")

@@ -284,11 +284,11 @@ def test_many_states_share_a_short_legend():
 
 
 def test_pictures_of_iterations_need_iterations(mesh, iterated):
-    with pytest.raises(ValueError, match="^iterations_relief: optimum has no iterations"):
+    with pytest.raises(ValueError, match="^optimum has no iterations"):
         plot.iterations_relief(mesh, optimum())
-    with pytest.raises(ValueError, match="^iterations_transmission_error: optimum has no iterations"):
+    with pytest.raises(ValueError, match="^optimum has no iterations"):
         plot.iterations_transmission_error(optimum(), PHASE)
-    with pytest.raises(ValueError, match='^iterations_relief: gear "rack" is not known'):
+    with pytest.raises(ValueError, match='^gear "rack" is not known'):
         plot.iterations_relief(mesh, iterated, "rack")
 
 
@@ -331,7 +331,7 @@ def test_front_is_drawn_as_it_is_and_the_chosen_design_marked(front):
         name: [*point] for name, point in beside.items()
     }
     assert len({line.get_marker() for line in (star, *drawn)}) == 3
-    with pytest.raises(ValueError, match="^optimum_front: chosen is 12, must be a design of the front, 0 to 11"):
+    with pytest.raises(ValueError, match="^chosen is 12, must be a design of the front, 0 to 11"):
         plot.optimum_front(front, chosen=12)
 
 

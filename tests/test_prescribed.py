@@ -68,7 +68,7 @@ def test_teeth_that_are_apart_carry_exactly_nothing(mesh):
 
 
 def test_wrong_errors_are_named(mesh):
-    with pytest.raises(ValueError, match=r"solve_at: transmission_error has shape \(3,\), must be a single number or"):
+    with pytest.raises(ValueError, match=r"transmission_error has shape \(3,\), must be a single number or"):
         contact(mesh, jnp.zeros(3))
-    with pytest.raises(ValueError, match="solve_at: transmission_error = nan um must be finite"):
+    with pytest.raises(ValueError, match="transmission_error = nan um must be finite"):
         contact(mesh, jnp.nan)

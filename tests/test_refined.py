@@ -19,9 +19,8 @@ def test_the_result_does_not_belong_to_the_positions_of_the_search():
     """At 16 positions the search fits the flanks to these positions; what it reports is true at any."""
     pair = gear_pair()
     coarse, fine = (prepare(pair, resolution=jg.Resolution(positions=n, pairs=2)) for n in (16, 512))
-    options = {"torque": TORQUE, "method": jg.optimize.SLP(starts=2, rounds=1, steps=15)}
-    fitted = jg.minimize(design, BOX, mesh=coarse, positions=None, **options)
-    result = jg.minimize(design, BOX, mesh=coarse, positions=128, **options)
+    problem, method = jg.Problem(coarse, TORQUE, design, BOX), jg.optimize.SLP(starts=2, rounds=1, steps=15)
+    fitted, result = (jg.minimize(problem, method, positions=positions) for positions in (None, 128))
     assert np.isnan(fitted.grid_change) and fitted.positions == 16
     assert result.positions >= 128
     assert abs(result.grid_change) <= 0.02 * result.objective or result.positions > 1024

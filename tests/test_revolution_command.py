@@ -123,7 +123,7 @@ def test_what_is_refused(written, teeth, message):
 
 def test_names_of_quantities_take_the_table(written):
     search = FREE.replace("[optimize]", '[optimize]\nobjective = "pinion_side_bands"')
-    assert Search.of(load_design(written(base=search))).options["objective"].settings.counts == (19, 48)
+    assert Search.of(load_design(written(base=search))).problem["objective"].settings.counts == (19, 48)
     base = FIXED.replace("amount = 6.5", 'amount = "height"') + VARIABLES
     sweep = base + '[sweep]\nsamples = 8\nresults = ["total_composite_error"]\n'
     assert asked_sweep(load_design(written(base=sweep))).results[0].settings.over == "pinion"

@@ -116,7 +116,7 @@ def test_a_rounded_design_keeps_bounds_and_limits_and_searches_what_has_no_step(
 )
 def test_a_step_that_cannot_be_is_refused(steps, said):
     with pytest.raises(ValueError, match=said):
-        check_steps("minimize", steps, {"pinion": (1.0, 20.0), "wheel": (0.0, 20.0)})
+        check_steps(steps, {"pinion": (1.0, 20.0), "wheel": (0.0, 20.0)})
 
 
 FILE = """

@@ -369,8 +369,8 @@ def shaft(**changes):
         (lambda: MatrixBearing("A", 0.0, -np.eye(5)), "must be positive semidefinite"),
         (lambda: support(two_stages(), 2), "mesh = 2 must be at most 1"),
         (lambda: support(alone([Section(9, 9)], [Bearing("A", 0, 1.0, 0.0, 1.0)])), "gearbox has no mesh"),
-        (lambda: elastic_line(two_stages(), "crank", [1.0]), 'elastic_line: shaft "crank" is not known'),
-        (lambda: elastic_line(two_stages(), "in", 1e4), "elastic_line: position = 10000 mm must be at least 0 mm"),
+        (lambda: elastic_line(two_stages(), "crank", [1.0]), 'shaft "crank" is not known'),
+        (lambda: elastic_line(two_stages(), "in", 1e4), "position = 10000 mm must be at least 0 mm"),
         (lambda: Gearbox([], []), "Gearbox: shafts must not be empty"),
     ],
 )

@@ -57,7 +57,7 @@ def test_relief_rules_follow_the_load(rule):
         slope, h = jax.grad(lambda t: rule(PAIR, t))(torque), 1e-4
         central = (rule(PAIR, torque + h) - rule(PAIR, torque - h)) / (2 * h)
         assert float(slope) == pytest.approx(float(central), rel=1e-6)
-    with pytest.raises(ValueError, match=f"{rule.__name__}: torque = -1 N m"):
+    with pytest.raises(ValueError, match="torque = -1 N m"):
         rule(PAIR, -1.0)
     with pytest.raises(ValueError, match=f"{rule.__name__}: application_factor"):
         rule(PAIR, 1.0, -0.5)
@@ -78,7 +78,7 @@ def test_run_in_relief():
     assert float(jax.grad(run_in_relief)(97 * 18.45)) == pytest.approx(0.0, abs=1e-12)
     slope = float(jax.grad(run_in_relief)(1200.0))
     assert slope == pytest.approx(float(run_in_relief(1201.0) - run_in_relief(1199.0)) / 2, rel=1e-9)
-    with pytest.raises(ValueError, match="run_in_relief: hertz_limit = 0 MPa"):
+    with pytest.raises(ValueError, match="hertz_limit = 0 MPa"):
         run_in_relief(0.0)
 
 
@@ -133,7 +133,7 @@ def test_dynamic_relief_of_a_real_mesh():
     central = (of_torque(50.01) - of_torque(49.99)) / 0.02
     assert float(jax.grad(of_torque)(50.0)) == pytest.approx(float(central), rel=1e-5)
     for name in ("internal_force", "external_force"):
-        with pytest.raises(ValueError, match=f"dynamic_relief: {name} = -1 N"):
+        with pytest.raises(ValueError, match=f"{name} = -1 N"):
             dynamic_relief(cycle, **{name: -1.0})
 
 
@@ -163,7 +163,7 @@ def test_end_relief_by_hardness():
     amounts = [end_relief_amount(10.0, 15.0, kind=k) for k in ("through_hardened", "surface_hardened", "stiff")]
     np.testing.assert_array_equal(amounts, [30.0, 15.0, 10.0])
     assert float(amounts[1]) == float(crowning_for_misalignment(equivalent_misalignment(10.0, 15.0)))
-    with pytest.raises(ValueError, match="end_relief_amount: kind = 'soft' must be"):
+    with pytest.raises(ValueError, match="kind = 'soft' must be"):
         end_relief_amount(10.0, kind="soft")
 
 

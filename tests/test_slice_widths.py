@@ -397,13 +397,13 @@ def test_refusals(mesh):
     table = TabulatedSupport(mesh.pair, np.eye(6))
     with pytest.raises(ValueError, match="support is a TabulatedSupport, over slices of equal width, the mesh has"):
         mesh_of(support=table)
-    with pytest.raises(ValueError, match="end_relief_widths: length = 7 mm must be greater than 0 mm and at most 6 mm"):
+    with pytest.raises(ValueError, match="length = 7 mm must be greater than 0 mm and at most 6 mm"):
         end_relief_widths(18.0, 7.0)
     with pytest.raises(ValueError, match="slices = 8 must be a whole number of at least 9"):
         end_relief_widths(18.0, 3.0, 8)
     with pytest.raises(ValueError, match="length = 0.1 mm must be at least 0.10"):
         end_relief_widths(18.0, 0.1)
-    with pytest.raises(ValueError, match="end_relief_widths: slices = 40 are too many for a relief of length = 6 mm"):
+    with pytest.raises(ValueError, match="slices = 40 are too many for a relief of length = 6 mm"):
         end_relief_widths(18.0, 6.0, 40)
 
 

@@ -54,7 +54,8 @@ def numbers(mesh, row, torque=50.0, names=FEW):
 
 def run(mesh, plan=PLAN, **options):
     """A sweep of the few results; all calls share one compiled program."""
-    return jg.sweep(design, plan, **{"mesh": mesh, "torque": 50.0, "results": FEW, "part_rows": 16, **options})
+    torque = options.pop("torque", 50.0)
+    return jg.sweep(mesh, torque, design, plan, **{"results": FEW, "part_rows": 16, **options})
 
 
 @pytest.fixture(scope="module")
@@ -138,7 +139,7 @@ def test_a_tolerance_gives_mean_and_quantile_over_common_deviations(mesh):
     tolerance = jg.Tolerance.from_class(mesh.pair, 6).without_lead()
     table = run(mesh, tolerance=tolerance, samples=4, seed=9, results=("ppte", "effective_contact_ratio"))
     assert table.results[:2] == ("ppte_um_mean", "ppte_um_q95")
-    deviations = jg.tolerance.sample_deviations(tolerance, mesh, 4, seed=9)
+    deviations = jg.ManufacturedGears(tolerance, 4, 9).on(mesh)
     pinion, wheel = design(dict(zip(BOUNDS, PLAN.rows(7, 8)[0])))
 
     @eqx.filter_jit
@@ -424,7 +425,7 @@ def test_another_design_or_mesh_is_another_sweep(mesh, folder):
         return jg.TipRelief(x["pinion"], x["length"]), jg.TipRelief(x["wheel"], x["length"], jg.Linear())
 
     with pytest.raises(ValueError, match=r"other settings \(design\)"):
-        jg.sweep(other, PLAN, mesh=mesh, torque=50.0, results=FEW, part_rows=16, output=folder)
+        jg.sweep(mesh, 50.0, other, PLAN, results=FEW, part_rows=16, output=folder)
     softer = eqx.tree_at(lambda m: m.structure, mesh, mesh.structure * (1 + 1e-12))
     with pytest.raises(ValueError, match=r"other settings \(mesh\)"):
         run(softer, output=folder)
@@ -435,9 +436,9 @@ def test_another_design_or_mesh_is_another_sweep(mesh, folder):
     [
         ({"results": ()}, "results must be different and at least one"),
         ({"results": ("ppte", "ppte")}, "results must be different"),
-        ({"results": ("noise",)}, 'sweep: "noise" is not known'),
+        ({"results": ("noise",)}, '"noise" is not known'),
         ({"part_rows": 0}, "part_rows = 0 must be a whole number of at least 1"),
-        ({"torque": -1.0}, "sweep: torque = -1 N m must be at least 0"),
+        ({"torque": -1.0}, "torque = -1 N m must be at least 0"),
     ],
 )
 def test_wrong_arguments_are_refused_before_anything_is_written(mesh, tmp_path, options, problem):
@@ -449,7 +450,7 @@ def test_wrong_arguments_are_refused_before_anything_is_written(mesh, tmp_path, 
 def test_a_parameter_may_not_have_the_name_of_another_column(mesh):
     plan = jg.Sobol({"ppte_um": (0.0, 1.0)}, 4, seed=0)
     with pytest.raises(ValueError, match='parameter "ppte_um" has the name of another column'):
-        jg.sweep(lambda x: (jg.TipRelief(x["ppte_um"], 2.0), None), plan, mesh=mesh, torque=50.0)
+        jg.sweep(mesh, 50.0, lambda x: (jg.TipRelief(x["ppte_um"], 2.0), None), plan)
 
 
 @pytest.mark.parametrize(

@@ -109,7 +109,7 @@ def test_the_table_is_that_of_the_library(folder):
     )
     file = load_design(folder / "gear.toml")
     plan = asked_sweep(file).plan
-    direct = jg.sweep(file.design, plan, mesh=file.mesh(), torque=50.0, results=("ppte", "effective_contact_ratio"))
+    direct = jg.sweep(file.mesh(), 50.0, file.design, plan, results=("ppte", "effective_contact_ratio"))
     np.testing.assert_array_equal(table.column("ppte_um"), direct.column("ppte_um"))
 
 
@@ -149,7 +149,7 @@ def test_repeated_it_finds_everything_there(folder):
     result = sweep(folder / "gear.toml", "-o", folder / "out")
     assert result.code == 0 and "resuming, 60 of 60 variants are complete" in result.err
     assert {path.name: path.stat().st_mtime_ns for path in (folder / "out" / "table").glob("part-*")} == before
-    other = sweep(folder / "gear.toml", "-o", folder / "out", "--samples", "61")
+    other = sweep(folder / "out", "--samples", folder / "gear.toml", "-o")
     assert_refused(other, "table: holds a sweep of other settings (plan, variants)")
 
 
@@ -313,7 +313,7 @@ def test_a_wrong_sweep_is_refused_before_anything_is_written(tmp_path, monkeypat
 def test_the_example_asks_for_a_million():
     example = Path(__file__).parents[1] / "examples" / "sweep_19_48.toml"
     request = asked_sweep(load_design(example))
-    assert request.plan.size == 1_000_000 and request.torque.torques.tolist() == [50.0]
+    assert request.plan.size == 1_000_000 and request.load.torques.tolist() == [50.0]
 
 
 def test_a_file_without_a_sweep_or_variables_is_refused(tmp_path):
@@ -333,11 +333,11 @@ def test_requests_cover_all_that_a_file_can_say(tmp_path):
     factorial = request('"latin_hypercube"\nsamples = 60', '"full_factorial"\nlevels = { height = [3.0, 5.0] }').plan
     assert factorial.rows(0, 2).tolist() == [[3.0], [5.0]]
     assert request('"latin_hypercube"\nsamples = 60', '"full_factorial"\nlevels = 7').plan.size == 7
-    load = request("part_rows = 25", "torques = [25.0, 50.0]\nweights = [3, 1]").torque
+    load = request("part_rows = 25", "torques = [25.0, 50.0]\nweights = [3, 1]").load
     assert load.weights.tolist() == [0.75, 0.25]
-    tolerance = request("[sweep]", "[tolerance]\nquality_class = [5, 6]\nsamples = 8\nseed = 2\n[sweep]")
-    assert (tolerance.samples, tolerance.seed) == (8, 2) and tolerance.tolerance.pinion.helix_slope is None
-    assert request("[sweep]", "[sweep]").tolerance is None
+    gears = request("[sweep]", "[tolerance]\nquality_class = [5, 6]\nsamples = 8\nseed = 2\n[sweep]").manufactured
+    assert (gears.samples, gears.seed) == (8, 2) and gears.tolerance.pinion.helix_slope is None
+    assert request("[sweep]", "[sweep]").manufactured is None
 
 
 @pytest.mark.parametrize(

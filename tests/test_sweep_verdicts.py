@@ -29,10 +29,10 @@ def test_the_flag_of_a_sweep_is_the_verdict_of_the_constructors():
     expected = np.array([accepted(row) for row in rows])
     assert not expected[0] and not expected[1] and expected[2] and 8 < expected.sum() < 30
     table = jg.sweep(
+        lambda v: jg.prepare(pair_of(v), resolution=jg.Resolution(positions=8, contact_nodes=2, pairs=3)),
+        50.0,
         lambda v: (None, None),
         jg.VariantList(tuple(BOUNDS), rows),
-        mesh=lambda v: jg.prepare(pair_of(v), resolution=jg.Resolution(positions=8, contact_nodes=2, pairs=3)),
-        torque=50.0,
     )
     np.testing.assert_array_equal(table.column("converged"), expected)
     np.testing.assert_array_equal(np.isnan(table.column("ppte_um")), ~expected)

@@ -53,7 +53,7 @@ def solve(mesh, deviation, torque=TORQUE):
 
 def sample(tolerance, mesh, seed=0, number=0):
     """One deviation."""
-    return one_of(jg.tolerance.sample_deviations(tolerance, mesh, COUNT, seed=seed), number)
+    return one_of(jg.ManufacturedGears(tolerance, COUNT, seed).on(mesh), number)
 
 
 def one_of(samples, number):
@@ -137,17 +137,17 @@ def test_impossible_limits_are_refused(build, message):
 
 def test_one_slice_refuses_lead_deviations(pair, mesh, tolerance):
     for call in (
-        jg.tolerance.sample_deviations,
-        lambda t, m, n, seed: jg.monte_carlo(m, TORQUE, tolerance=t, samples=n),
+        lambda tolerance: jg.ManufacturedGears(tolerance, COUNT).on(mesh),
+        lambda tolerance: jg.monte_carlo(mesh, TORQUE, jg.ManufacturedGears(tolerance, COUNT)),
     ):
         with pytest.raises(ValueError, match="pinion helix_slope = 6 um must be None or 0 um on a mesh of 1 slice"):
-            call(tolerance, mesh, COUNT, 0)
+            call(tolerance)
         with pytest.raises(ValueError, match="misalignment = 4 um must be None or 0 um on a mesh of 1 slice"):
-            call(jg.Tolerance(misalignment=4.0), mesh, COUNT, 0)
+            call(jg.Tolerance(misalignment=4.0))
     with pytest.raises(ValueError, match="traced limit"):
-        jax.jit(lambda t: jg.tolerance.sample_deviations(t, mesh, COUNT, 0))(tolerance)
-    jg.tolerance.sample_deviations(tolerance.without_lead(), mesh, COUNT, 0)
-    jg.tolerance.sample_deviations(jg.Tolerance(misalignment=0.0), mesh, COUNT, 0)
+        jax.jit(lambda t: jg.ManufacturedGears(t, COUNT, 0).on(mesh))(tolerance)
+    jg.ManufacturedGears(tolerance.without_lead(), COUNT, 0).on(mesh)
+    jg.ManufacturedGears(jg.Tolerance(misalignment=0.0), COUNT, 0).on(mesh)
 
 
 def of_every_kind(distribution):
@@ -167,7 +167,7 @@ def of_every_kind(distribution):
     ids=["normal", "uniform"],
 )
 def test_deviations_are_distributed_within_their_limits(wide_mesh, distribution, deviation):
-    samples = jg.tolerance.sample_deviations(of_every_kind(distribution), wide_mesh, MANY, seed=3)
+    samples = jg.ManufacturedGears(of_every_kind(distribution), MANY, 3).on(wide_mesh)
     samples = jax.tree.map(np.asarray, samples)
     for values, limit in (
         (samples.pinion.profile_slope, 4.0),
@@ -189,7 +189,7 @@ def test_deviations_are_distributed_within_their_limits(wide_mesh, distribution,
 def test_waviness_keeps_mean_line_and_form_tolerance(wide_mesh):
     """Least-squares line through the deviation along the whole profile is zero; its height is the form deviation."""
     tolerance = of_every_kind(jg.tolerance.Uniform())
-    waves = jg.tolerance.sample_deviations(tolerance, wide_mesh, MANY, seed=1).pinion.waviness[:200]
+    waves = jg.ManufacturedGears(tolerance, MANY, 1).on(wide_mesh).pinion.waviness[:200]
     flank = wide_mesh.flanks()[0]
     x = jnp.linspace(0.0, 1.0, 4001)
     length = flank.start_roll_length + x * (flank.tip_roll_length - flank.start_roll_length)
@@ -225,7 +225,7 @@ def test_zero_tolerance_is_the_nominal_design(mesh):
     np.testing.assert_allclose(jg.tolerance.deviated_material(mesh, TORQUE, zero, **RELIEF).amount, design, rtol=1e-13)
     nominal = np.asarray(solve(mesh, zero).transmission_error)
     none = jg.Tolerance().without_lead()  # as that of the other tests: one program
-    scatter = jg.monte_carlo(mesh, TORQUE, tolerance=none, samples=COUNT, **RELIEF)
+    scatter = jg.monte_carlo(mesh, TORQUE, jg.ManufacturedGears(none, COUNT), **RELIEF)
     np.testing.assert_allclose(scatter.nominal_transmission_error, nominal, rtol=1e-13)
     assert (np.asarray(scatter.transmission_error_quantiles) == scatter.nominal_transmission_error[None]).all()
     assert (np.asarray(scatter.ppte) == scatter.nominal_ppte).all()
@@ -280,11 +280,11 @@ def test_misalignment_of_either_sign_acts_alike(wide_mesh):
 
 def test_samples_depend_on_seed_and_number_only(mesh, tolerance):
     tolerance = tolerance.without_lead()
-    few, many = (jg.tolerance.sample_deviations(tolerance, mesh, samples, seed=7) for samples in (5, COUNT))
+    few, many = (jg.ManufacturedGears(tolerance, samples, 7).on(mesh) for samples in (5, COUNT))
     jax.tree.map(lambda a, b: np.testing.assert_array_equal(a, b[:5]), few, jax.tree.map(np.asarray, many))
-    compiled = jax.jit(lambda t, seed: jg.tolerance.sample_deviations(t, mesh, 5, seed))(tolerance, 7)
+    compiled = jax.jit(lambda tolerance: jg.ManufacturedGears(tolerance, 5, 7).on(mesh))(tolerance)
     jax.tree.map(lambda a, b: np.testing.assert_allclose(a, b, rtol=1e-12), few, compiled)
-    other = jg.tolerance.sample_deviations(tolerance, mesh, COUNT, seed=8)
+    other = jg.ManufacturedGears(tolerance, COUNT, 8).on(mesh)
     assert not np.any(np.asarray(many.pinion.pitch) == np.asarray(other.pinion.pitch))
 
 
@@ -293,7 +293,7 @@ def test_common_random_numbers_scale_with_the_limits(mesh, tolerance):
     on the same gears."""
     once = tolerance.without_lead()
     grown = (jax.tree.map(lambda limit, by=by: by * limit, gear) for gear, by in ((once.pinion, 2), (once.wheel, 3)))
-    first, then = (jg.tolerance.sample_deviations(t, mesh, COUNT, seed=2) for t in (once, jg.Tolerance(*grown)))
+    first, then = (jg.ManufacturedGears(t, COUNT, 2).on(mesh) for t in (once, jg.Tolerance(*grown)))
     for by, *gears in ((2, first.pinion, then.pinion), (3, first.wheel, then.wheel)):
         for a, b in zip(*map(jax.tree.leaves, gears), strict=True):
             np.testing.assert_allclose(by * np.asarray(a), b, rtol=1e-12)
@@ -302,9 +302,9 @@ def test_common_random_numbers_scale_with_the_limits(mesh, tolerance):
 def test_monte_carlo_holds_the_samples_of_its_seed(mesh, tolerance):
     tolerance = tolerance.without_lead()
     scatter = jg.monte_carlo(
-        mesh, TORQUE, tolerance=tolerance, samples=COUNT, seed=11, quantiles=(0.5, 0.0, 1.0), **RELIEF
+        mesh, TORQUE, jg.ManufacturedGears(tolerance, COUNT, 11), quantiles=(0.5, 0.0, 1.0), **RELIEF
     )
-    deviations = jg.tolerance.sample_deviations(tolerance, mesh, COUNT, seed=11)
+    deviations = jg.ManufacturedGears(tolerance, COUNT, 11).on(mesh)
     curves = np.stack([solve(mesh, one_of(deviations, number)).transmission_error for number in range(COUNT)])
     np.testing.assert_allclose(scatter.ppte, np.ptp(curves, axis=1), rtol=1e-9)
     assert float(scatter.mean) == pytest.approx(np.ptp(curves, axis=1).mean())
@@ -312,7 +312,7 @@ def test_monte_carlo_holds_the_samples_of_its_seed(mesh, tolerance):
     np.testing.assert_allclose(scatter.quantiles, [0.0, 0.5, 1.0])
     ends = [curves.min(axis=0), curves.max(axis=0)]
     np.testing.assert_allclose(scatter.transmission_error_quantiles[::2], ends, rtol=1e-9)
-    again = jg.monte_carlo(mesh, TORQUE, tolerance=tolerance, samples=COUNT, seed=11, **RELIEF)
+    again = jg.monte_carlo(mesh, TORQUE, jg.ManufacturedGears(tolerance, COUNT, 11), **RELIEF)
     np.testing.assert_array_equal(again.ppte, scatter.ppte)
     assert str(scatter).startswith("Scatter of 20 samples, 0 failed")
 
@@ -326,7 +326,7 @@ def test_one_compilation_serves_every_number(mesh, tolerance, nothing_compiled, 
     for amount in (1.0, 2.0, 3.0):
         design = {"pinion": jg.TipRelief(amount, 3.0), "wheel": jg.TipRelief(5.0, 3.0)}
         limits = jg.Tolerance(gear, jg.tolerance.GearTolerance(amount, 2 * amount, 3 * amount))
-        jg.monte_carlo(mesh, 40.0 + amount, tolerance=limits, samples=COUNT, seed=int(amount), **design)
+        jg.monte_carlo(mesh, 40.0 + amount, jg.ManufacturedGears(limits, COUNT, int(amount)), **design)
     assert 0 < len(traces) <= 2  # a loop is traced for its shapes too
 
 
@@ -355,14 +355,14 @@ def test_failed_samples_count_against_the_design():
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"samples": 1}, "samples = 1 must be a whole number of at least 2"),
+        ({"manufactured": jg.ManufacturedGears(jg.Tolerance(), 1)}, "samples = 1 must be a whole number of at least 2"),
         ({"quantiles": (0.1, 1.2)}, "quantiles = 1.2 must be at least 0 and at most 1"),
         ({"torque": -5.0}, "torque = -5 N m must be at least 0 N m"),
     ],
 )
 def test_monte_carlo_refuses_impossible_arguments(mesh, change, message):
-    arguments = {"torque": TORQUE, "tolerance": jg.Tolerance(), **change}
-    with pytest.raises(ValueError, match=f"^monte_carlo: {message}$"):
+    arguments = {"torque": TORQUE, "manufactured": jg.ManufacturedGears(jg.Tolerance(), 4), **change}
+    with pytest.raises(ValueError, match=f"^{message}$"):
         jg.monte_carlo(mesh, **arguments)
 
 
@@ -373,7 +373,7 @@ def test_gradients_of_the_mean_scatter_agree_with_differences(mesh, tolerance):
     def mean_energy(amount, pitch):
         """Mean square variation of the transmission error, which has no kinks, over common random numbers."""
         pinion = jg.tolerance.GearTolerance(tolerance.pinion.profile_slope, tolerance.pinion.profile_form, pitch)
-        deviations = jg.tolerance.sample_deviations(jg.Tolerance(pinion, tolerance.wheel), mesh, 6, seed=4)
+        deviations = jg.ManufacturedGears(jg.Tolerance(pinion, tolerance.wheel), 6, 4).on(mesh)
 
         def one(deviation):
             removed = jg.tolerance.deviated_material(mesh, TORQUE, deviation, pinion=jg.TipRelief(amount, 4.0))
@@ -392,7 +392,7 @@ def test_gradients_of_the_mean_scatter_agree_with_differences(mesh, tolerance):
 
 @pytest.mark.slow
 def test_two_devices_give_the_samples_of_one(mesh, tolerance):
-    one = jg.monte_carlo(mesh, TORQUE, tolerance=tolerance.without_lead(), samples=COUNT, seed=1, **RELIEF)
+    one = jg.monte_carlo(mesh, TORQUE, jg.ManufacturedGears(tolerance.without_lead(), COUNT, 1), **RELIEF)
     program = """
 import jax
 jax.config.update("jax_enable_x64", True)

@@ -41,8 +41,8 @@ def tabulated(flat, folder):
 
 @pytest.fixture(scope="module")
 def best(flat):
-    options = {"mesh": flat, "positions": None, "method": jg.optimize.Factorial(levels=7)}
-    return jg.minimize(reliefs, BOX, torque=jg.LoadSpectrum(TORQUES, (1.0, 2.0)), measure=jg.Worst(), **options)
+    problem = jg.Problem(flat, jg.LoadSpectrum(TORQUES, (1.0, 2.0)), reliefs, BOX, measure=jg.Worst())
+    return jg.minimize(problem, jg.optimize.Factorial(levels=7), positions=None)
 
 
 @pytest.fixture(scope="module")
@@ -74,7 +74,7 @@ def test_flanks_without_an_objective_are_verified_too(best, verified, folder):
 
 
 def test_levelled_flanks_are_verified_too(flat, tabulated, folder):
-    level = jg.optimize.iterate_transmission_error(flat, 50.0, steps=1)
+    level = jg.minimize(jg.Problem(flat, 50.0), jg.optimize.TransmissionErrorIteration(steps=1))
     found = jg.optimize.verify(level, cache=folder)
     assert found.objectives == found.claimed_objectives == {}
     assert found.ppte == pytest.approx(ppte(tabulated, 50.0, level.pinion, level.wheel), rel=1e-9)
@@ -98,11 +98,11 @@ def test_a_failed_solution_is_no_number(best, flat, folder):
 
 
 def test_free_flanks_on_the_finite_element_structure(tabulated):
-    free = jg.free_form(tabulated, 50.0, points=8, steps=12, positions=None)
+    free = jg.minimize(jg.Problem(tabulated, 50.0), jg.optimize.FreeForm(points=8, steps=12), positions=None)
     assert free.mesh.compliance is tabulated.compliance
     assert free.ppte < 0.3 * ppte(tabulated, 50.0, *2 * [jg.iso_relief(tabulated.pair, 50.0)])
     assert free.ppte == pytest.approx(ppte(tabulated, 50.0, free.pinion, free.wheel), rel=1e-9)
-    with pytest.raises(ValueError, match="^verify: mesh has the finite-element structure already"):
+    with pytest.raises(ValueError, match="^mesh has the finite-element structure already"):
         jg.optimize.verify(free)
 
 

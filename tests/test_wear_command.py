@@ -30,11 +30,11 @@ from jaxgear.io import (
     write_worn,
 )
 from jaxgear.io.folder import RESULT_FILES
-from jaxgear.io.tolerance_table import tolerance_of
+from jaxgear.io.tolerance_table import manufactured_of
 from jaxgear.studies import Checkpoints, NamedArrays, WearResult, WearStudy, wear_scatter
 from jaxgear.studies.checkpoints import Marches
 from jaxgear.studies.comparison import compared, sought
-from jaxgear.tolerance import deviated_material, sample_deviations
+from jaxgear.tolerance import deviated_material
 from jaxgear.wear import March, mean_over_life, over_life, wear, wear_depth
 
 pytestmark = pytest.mark.usefixtures("no_cache", "involute_as_relief")
@@ -359,19 +359,19 @@ def scatter(design, flanks, kept):
     """Lives of the manufactured pairs of a file, with reliefs of one height."""
     mesh, settings = design.mesh(), WearStudy.of(design).settings
     designs = {"relieved": (relief(flanks), relief(flanks))}
-    options = {"samples": design.tables["tolerance"].samples, "seed": design.tables["tolerance"].seed, "keep": kept}
-    found = wear_scatter.manufactured_wear(settings, mesh, 150.0, designs, tolerance_of(design), **options)
+    gears = manufactured_of(design)
+    found = wear_scatter.manufactured_wear(mesh, 150.0, designs, settings, gears, keep=kept)
     return mesh, found["relieved"]
 
 
 @pytest.mark.slow
 def test_manufactured_pairs_live_as_their_deviations_let_them(file, tmp_path, monkeypatch):
-    """Each is the life of the gears that `sample_deviations` draws; finer gears scatter less."""
+    """Each is the life of the manufactured gears of the file; finer gears scatter less."""
     design = load_design(file(PAIR + TABLE + TOLERANCE))
     kept = Checkpoints(tmp_path / ".runs").of(NamedArrays())
     mesh, found = scatter(design, 5.0, kept)
     assert list(found) == ["mean_ppte_over_life", "wear_depth", "life_to_depth"]
-    drawn = sample_deviations(tolerance_of(design), mesh, 3, seed=0)
+    drawn = manufactured_of(design).on(mesh)
     options = {"pinion": relief(5.0), "wheel": relief(5.0)}
     nominal = np.asarray(removed_material(mesh, 150.0, **options).amount)
     for number in range(3):
@@ -509,7 +509,7 @@ def test_kept_blocks_are_not_worn_again(tmp_path, file):
     class Stop(Exception):
         pass
 
-    def stopped(done, total):
+    def stopped(*_):
         raise Stop
 
     with pytest.raises(Stop):
@@ -656,6 +656,6 @@ def test_other_files_are_refused_in_one_line(tmp_path):
 
 
 def test_pictures_of_other_gears_are_refused_in_one_line():
-    with pytest.raises(ValueError, match='worn_flank: gear = \'rack\' must be "pinion" or "wheel"') as refused:
+    with pytest.raises(ValueError, match='gear = \'rack\' must be "pinion" or "wheel"') as refused:
         plot.worn_flank(None, "rack")
     assert "\n" not in str(refused.value)

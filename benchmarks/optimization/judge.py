@@ -40,7 +40,7 @@ class Judge:
     def __init__(self, task: Task, positions: int, gears: int):
         self._mesh = task.mesh(positions)
         self._torques = jnp.asarray(task.torque * _TORQUES)
-        samples = jg.tolerance.sample_deviations(task.tolerance, self._mesh, gears, seed=_SEED)
+        samples = jg.ManufacturedGears(task.tolerance, gears, _SEED).on(self._mesh)
         self._deviations = _fields(self._mesh, jnp.asarray(task.torque), samples)
 
     def __call__(self, found: Found) -> Verdict:

@@ -111,7 +111,6 @@ def methods(effort: Effort) -> list[Method]:
         Method("rule-based", _rule),
         Method("factorial", _searched(jg.optimize.Factorial(effort.levels))),
         Method("genetic", _searched(jg.optimize.Genetic(population, generations)), needs=_EVOLUTION),
-        Method("binary genetic", _searched(jg.optimize.BinaryGenetic(population, generations)), slow=True),
         Method(
             "differential evolution",
             _searched(jg.optimize.DifferentialEvolution(population, generations)),
@@ -126,7 +125,9 @@ def methods(effort: Effort) -> list[Method]:
         Method("iteration, type 2", _iterated_from_relief(effort), slow=True),
         Method(
             "free form",
-            lambda task, mesh, _: _found(jg.free_form(mesh, task.torque, points=effort.points, positions=None)),
+            lambda task, mesh, _: _found(
+                jg.minimize(jg.Problem(mesh, task.torque), jg.optimize.FreeForm(effort.points), positions=None)
+            ),
         ),
         Method("free form as cubic", _projected("cubic"), after="free form"),
         Method("free form as power", _projected("power"), after="free form"),
@@ -151,8 +152,7 @@ def _rule(task: Task, mesh: jg.Mesh, _) -> Found:
 
 def _searched(method):
     def run(task: Task, mesh: jg.Mesh, _) -> Found:
-        options = {"torque": task.torque, "method": method, "positions": None}
-        return _found(jg.minimize(task.design, task.bounds, mesh=mesh, **options))
+        return _found(jg.minimize(jg.Problem(mesh, task.torque, task.design, task.bounds), method, positions=None))
 
     return run
 
@@ -163,13 +163,14 @@ def _robust(effort: Effort):
     def run(task: Task, mesh: jg.Mesh, _) -> Found:
         load = jg.LoadSpectrum([share * task.torque for share in ROBUST_TORQUES])
         found = jg.minimize(
-            task.design,
-            task.bounds,
-            mesh=mesh,
-            torque=load,
-            measure=jg.CVaR(0.9),
-            tolerance=task.tolerance,
-            samples=effort.samples,
+            jg.Problem(
+                mesh,
+                load,
+                task.design,
+                task.bounds,
+                measure=jg.CVaR(0.9),
+                manufactured=jg.ManufacturedGears(task.tolerance, effort.samples),
+            ),
             method=jg.optimize.SLP(effort.slp_starts),
             positions=None,
         )
@@ -179,7 +180,8 @@ def _robust(effort: Effort):
 
 
 def _iterated(task: Task, mesh: jg.Mesh, _) -> Found:
-    return _found(jg.optimize.iterate_transmission_error(mesh, task.torque, max_relief=task.max_relief))
+    method = jg.optimize.TransmissionErrorIteration(max_relief=task.max_relief)
+    return _found(jg.minimize(jg.Problem(mesh, task.torque), method))
 
 
 def _iterated_from_relief(effort: Effort):
@@ -187,17 +189,12 @@ def _iterated_from_relief(effort: Effort):
 
     def run(task: Task, mesh: jg.Mesh, _) -> Found:
         start = jg.minimize(
-            task.relief,
-            task.relief_bounds,
-            mesh=mesh,
-            torque=task.torque,
-            objective="max_contact_pressure",
+            jg.Problem(mesh, task.torque, task.relief, task.relief_bounds, objective="max_contact_pressure"),
             method=jg.optimize.SLP(effort.slp_starts),
             positions=None,
         )
-        found = jg.optimize.iterate_transmission_error(
-            mesh, task.torque, pinion=start.pinion, wheel=start.wheel, max_relief=task.max_relief
-        )
+        method = jg.optimize.TransmissionErrorIteration("given", max_relief=task.max_relief)
+        found = jg.minimize(jg.Problem(mesh, task.torque, lambda variables: (start.pinion, start.wheel)), method)
         return _found(found, start.evaluations)
 
     return run

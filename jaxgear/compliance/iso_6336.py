@@ -44,7 +44,7 @@ def iso_stiffness(pair: GearPair, line_load: Given = _LIGHT_LOAD) -> IsoStiffnes
         pair: gear pair; the standard covers x1 >= x2 and -0.5 <= x1 + x2 <= 2.
         line_load: F_t K_A / b [N/mm]; below 100 N/mm the stiffness is reduced.
     """
-    check("iso_stiffness", "line_load", line_load, "N/mm", low=0.0)
+    check("line_load", line_load, "N/mm", low=0.0)
     return _iso_stiffness(pair, real(line_load))
 
 

@@ -11,8 +11,8 @@ from jaxtyping import Array, Float
 from ..contact import Mesh, OperatingPoint
 from ..contact.face_coupling import check_torque
 from ..contact.operating_point import Torque, operating_point_of
-from ..numerics import Checked, Given, Numbers, check, concrete, number, optional_real, program, real, result, whole
-from ..tolerance import Deviation, Tolerance, sample_deviations
+from ..numerics import Checked, Given, Numbers, check, concrete, number, optional_real, program, real, result
+from ..tolerance import Deviation, ManufacturedGears
 from ..tolerance.deviation import deviation_field, flank_basis
 
 
@@ -61,13 +61,13 @@ class LoadSpectrum(Checked):
         self.friction, self.duration = optional_real(friction), optional_real(duration)
         self._check_different()
         shares = real(np.ones(self.torques.shape, self.torques.dtype)) if weights is None else real(weights)
-        check("LoadSpectrum", "weights", shares, "", low=0.0)
+        check("LoadSpectrum: weights", shares, "", low=0.0)
         if shares.ndim != 1:
             raise ValueError(f"LoadSpectrum: weights must be a list of {len(self.torques)}, one per torque")
         shares = self._as_many("weights", shares)
         known = concrete(shares)
         total = jnp.sum(shares) if known is None else known.sum()
-        check("LoadSpectrum", "sum of the weights", total, "", low=0.0, open_low=True)
+        check("LoadSpectrum: sum of the weights", total, "", low=0.0, open_low=True)
         self.weights = shares / total if known is None else real(known / total)
 
     def _as_many(self, name: str, values: Array) -> Array:
@@ -99,10 +99,10 @@ class LoadSpectrum(Checked):
             ValueError: as the class does, and for hours that are all zero.
         """
         spent = real(hours)
-        check("LoadSpectrum", "hours", spent, "h", low=0.0)
+        check("LoadSpectrum: hours", spent, "h", low=0.0)
         if spent.ndim != 1:
             raise ValueError("LoadSpectrum: hours must be a list, one entry per torque")
-        check("LoadSpectrum", "sum of the hours", jnp.sum(spent), "h", low=0.0, open_low=True)
+        check("LoadSpectrum: sum of the hours", jnp.sum(spent), "h", low=0.0, open_low=True)
         return LoadSpectrum(torques, spent, speeds, friction, jnp.sum(spent))
 
     @property
@@ -110,11 +110,8 @@ class LoadSpectrum(Checked):
         """Hours at every torque [h]; None without a duration."""
         return None if self.duration is None else self.weights * self.duration
 
-    def turns(self, owner: str) -> Float[Array, " torques"]:
+    def turns(self) -> Float[Array, " torques"]:
         """Revolutions of the pinion at every torque; their shares, the weights, without a duration.
-
-        Args:
-            owner: name of the caller, for messages.
 
         Raises:
             ValueError: for a duration without speeds.
@@ -122,7 +119,7 @@ class LoadSpectrum(Checked):
         if self.duration is None:
             return self.weights
         if self.speeds is None:
-            raise ValueError(f"{owner}: a load spectrum with a duration needs speeds, for the number of revolutions")
+            raise ValueError("a load spectrum with a duration needs speeds, for the number of revolutions")
         return _MINUTES * self.weights * self.duration * self.speeds
 
     @staticmethod
@@ -138,7 +135,6 @@ def _alone(number: Array) -> Array | np.ndarray:
 
 
 _MINUTES = 60.0  # in an hour
-SAMPLES = 64  # manufactured pairs, where nothing is said
 
 Loads = Torque | LoadSpectrum  # one load or several
 Result = TypeVar("Result")  # a tree of arrays
@@ -170,7 +166,7 @@ class Conditions(Checked):
 
     def on(self, mesh: Mesh) -> "Cases":
         """The cases on a mesh; traceable, where every design has a mesh of its own."""
-        check_torque("load", mesh.support_torque, self.load.torques)
+        check_torque(mesh.support_torque, self.load.torques)
         load = jax.tree.map(lambda numbers: numbers.astype(mesh.slice_width.dtype), self.load)
         removed = None if self.deviations is None else _removed(mesh, load.torques, self.deviations)
         return Cases(load.torques, load.speeds, load.friction, load.weights, removed)
@@ -236,39 +232,20 @@ class Cases(Checked):
         return jax.vmap(at, (0, None))(loads, nothing)
 
 
-def conditions(
-    owner: str,
-    mesh: Mesh,
-    torque: Loads,
-    *,
-    tolerance: Tolerance | None = None,
-    samples: int | None = None,
-    seed: int = 0,
-) -> Conditions:
-    """Conditions of a torque or a load spectrum, with manufactured gears where there is a tolerance.
+def conditions(mesh: Mesh, torque: Loads, manufactured: ManufacturedGears | None = None) -> Conditions:
+    """Conditions of a torque or a load spectrum.
 
     Args:
-        owner: the function that is asked, for messages.
         mesh: prepared mesh; its number of pairs and its floating-point type count, nothing else.
         torque: on the pinion [N m], an `OperatingPoint`, or a `LoadSpectrum`.
-        tolerance: of manufactured gears; None for nominal ones.
-        samples: manufactured pairs, which run under every torque; None for 64. Sample i depends on the seed and on i
-            alone, see `sample_deviations`.
-        seed: of their deviations.
+        manufactured: manufactured gears, which run under every torque; None for nominal ones.
 
     Raises:
-        ValueError: for a negative torque, samples without a tolerance, and for lead deviations on a mesh of one slice.
+        ValueError: for a negative torque, and for lead deviations on a mesh of one slice.
     """
-    if isinstance(torque, LoadSpectrum):
-        load = torque
-    else:
-        load = LoadSpectrum.of(operating_point_of(owner, torque, real(0.0).dtype))
-    if tolerance is None:
-        if samples is not None:
-            raise ValueError(f"{owner}: samples = {samples!r} has no effect without a tolerance")
-        return Conditions(load)
-    count = SAMPLES if samples is None else whole(owner, "samples", samples)
-    return Conditions(load, sample_deviations(tolerance, mesh, count, seed))
+    if not isinstance(torque, LoadSpectrum):
+        torque = LoadSpectrum.of(operating_point_of(torque, real(0.0).dtype))
+    return Conditions(torque, None if manufactured is None else manufactured.on(mesh))
 
 
 @program

@@ -19,7 +19,7 @@ from ..contact.solve import flanks_of
 from ..contact.status import Status, Statuses, status_of
 from ..microgeometry import AbstractModification, NoModification
 from ..numerics import Checked, program, real, within_limits
-from ..tolerance import Tolerance
+from ..tolerance import ManufacturedGears
 from .cases import Cases, Conditions, Loads, LoadSpectrum, conditions
 
 Scalar = Float[Array, ""]
@@ -28,12 +28,6 @@ Modifications = tuple[AbstractModification | None, AbstractModification | None]
 Design = Callable[[Parameters], Modifications]
 
 Result = TypeVar("Result")
-
-# where the variables of an engine can be used
-_USES = {
-    "minimize": "design",
-    "sweep": "design, or in a mesh or torque that is a function of the variables",
-}
 
 
 class Variant(NamedTuple):
@@ -89,7 +83,7 @@ class Variants(Checked):
             conditions = self.conditions
             if self.torque is not None:
                 operating_point = operating_point_of(
-                    "torque", call_with("torque", self.torque, parameters), mesh.slice_width.dtype
+                    call_with("torque", self.torque, parameters), mesh.slice_width.dtype
                 )
                 made.append(operating_point)
                 conditions = Conditions(LoadSpectrum.of(operating_point), conditions.deviations)
@@ -112,7 +106,7 @@ class Variants(Checked):
             whole = self if mesh is None else eqx.tree_at(lambda tree: tree.mesh, self, mesh)
             variant = whole(values)
             first = variant.cases.first
-            both = flanks_of("removed_material", variant.mesh, variant.pinion, variant.wheel)
+            both = flanks_of(variant.mesh, variant.pinion, variant.wheel)
             # where the contacts slide to takes longer to trace
             removed = nominal_material(variant.mesh, first.torque, *both)
             own = None if mesh is not None else (variant.mesh, variant.cases)
@@ -125,28 +119,24 @@ class Variants(Checked):
 
 
 def variants(
-    owner: str,
-    design: Design,
     mesh: Mesh | Callable[[Parameters], Mesh],
     torque: Loads | Callable[[Parameters], Torque],
+    design: Design,
     *,
     names: Sequence[str],
     values: Sequence[Any] | np.ndarray | Array,
-    tolerance: Tolerance | None = None,
-    samples: int | None = None,
-    seed: int = 0,
+    manufactured: ManufacturedGears | None = None,
 ) -> Variants:
-    """Checks and collects what the variables of a problem make.
+    """Variants of a mesh and a load, checked.
 
     Args:
-        owner: the function that is asked, for messages.
-        design: makes (pinion, wheel) modifications from the named variables.
         mesh: prepared mesh, or a function of the named variables that prepares one; traced.
         torque: on the pinion [N m], an `OperatingPoint` or a `LoadSpectrum`; or a function of the named variables that
             gives a torque or an operating point.
+        design: makes (pinion, wheel) modifications from the named variables.
         names: of the variables.
         values: of the variables of one variant, by which the functions are tried.
-        tolerance, samples, seed: of manufactured gears, see `conditions`.
+        manufactured: manufactured gears, see `conditions`.
 
     Raises:
         ValueError: for whatever the functions and `conditions` refuse.
@@ -155,9 +145,8 @@ def variants(
     # shapes only: the example may be a variant that cannot be
     example = mesh if isinstance(mesh, Mesh) else eqx.filter_eval_shape(partial(call_with, "mesh", mesh), parameters)
     if not isinstance(example, Mesh):
-        raise ValueError(f"{owner}: mesh gives {type(example).__name__}, must be a Mesh as `prepare` makes it")
-    given = 0.0 if callable(torque) else torque
-    judged = conditions(owner, example, given, tolerance=tolerance, samples=samples, seed=seed)
+        raise ValueError(f"mesh gives {type(example).__name__}, must be a Mesh as `prepare` makes it")
+    judged = conditions(example, 0.0 if callable(torque) else torque, manufactured)
     fixed = isinstance(mesh, Mesh) and not callable(torque)
     return Variants(
         names=tuple(names),
@@ -196,11 +185,11 @@ def call_with(name: str, function: Callable[[Parameters], Result], parameters: P
         ) from error
 
 
-def check_used(owner: str, names: Sequence[str], used: Sequence[str]) -> None:
+def check_used(names: Sequence[str], used: Sequence[str]) -> None:
     """Raises a `ValueError` that names the variables on which nothing depends."""
     unused = [f'"{name}"' for name in names if name not in used]
     if unused:
-        raise ValueError(f"{owner}: nothing depends on {', '.join(unused)}: use it in {_USES[owner]}, or leave it out")
+        raise ValueError(f"nothing depends on {', '.join(unused)}: use it in design, or leave it out")
 
 
 def two_modifications(made: object) -> tuple[AbstractModification, AbstractModification]:

@@ -33,7 +33,7 @@ class ModifiedMesh(eqx.Module):
     def __init__(
         self, mesh: Mesh, *, pinion: AbstractModification | None = None, wheel: AbstractModification | None = None
     ) -> None:
-        check_mesh("ModifiedMesh", mesh)
+        check_mesh(mesh)
         self.pinion = NoModification() if pinion is None else pinion
         self.wheel = NoModification() if wheel is None else wheel
         self._mesh = Frozen(mesh)

@@ -83,7 +83,7 @@ def fewest_pairs(pair: GearPair, *, deflection: float = 100.0) -> int:
     enough = np.flatnonzero(gaps.min(axis=1) > deflection)
     if not enough.size:
         raise ValueError(
-            f"fewest_pairs: {int(fewest) + _MORE_PAIRS} pairs do not contain every contact up to deflection = "
+            f"{int(fewest) + _MORE_PAIRS} pairs do not contain every contact up to deflection = "
             f"{deflection:g} um: the torque is too large for these teeth, or is it not in N m, or the elastic modulus "
             "not in MPa?"
         )

@@ -178,18 +178,14 @@ def check_support(support: AbstractSupport | None, pair: GearPair, resolution: R
     if support is None:
         return
     if not isinstance(support, AbstractSupport):
-        raise TypeError(
-            f"prepare: support is a {type(support).__name__}, must be a support: jaxgear.shafts.support makes one"
-        )
+        raise TypeError(f"support is a {type(support).__name__}, must be a support: jaxgear.shafts.support makes one")
     if resolution.slices == 1:
-        raise ValueError(
-            "prepare: support acts over the face, which a mesh of 1 slice cannot show: Resolution(slices=11)"
-        )
+        raise ValueError("support acts over the face, which a mesh of 1 slice cannot show: Resolution(slices=11)")
     if not resolution.coupled_slices:
-        raise ValueError("prepare: support needs coupled slices: Resolution(coupled_slices=True)")
+        raise ValueError("support needs coupled slices: Resolution(coupled_slices=True)")
     if support.needs_even_slices and resolution.parts is not None:
         raise ValueError(
-            f"prepare: support is a {type(support).__name__}, over slices of equal width, the mesh has others: leave "
+            f"support is a {type(support).__name__}, over slices of equal width, the mesh has others: leave "
             "slice_widths out of the resolution, or give a support that is defined all over the face"
         )
     # numbers that one pair has and the other leaves to its defaults cannot be compared one by one
@@ -197,7 +193,7 @@ def check_support(support: AbstractSupport | None, pair: GearPair, resolution: R
     for one, other in zip(given, own, strict=True):
         here, there = (None if leaf is None else concrete(leaf) for leaf in (one, other))
         if here is not None and there is not None and not np.allclose(here, there, rtol=_SAME):
-            raise ValueError("prepare: support holds another pair than the one to prepare: take support.pair")
+            raise ValueError("support holds another pair than the one to prepare: take support.pair")
 
 
 def check_modes(support: AbstractSupport | None, resolution: Resolution) -> None:
@@ -215,7 +211,7 @@ def check_modes(support: AbstractSupport | None, resolution: Resolution) -> None
     missed = np.linalg.norm(matrix - kept) / np.linalg.norm(matrix)
     if missed > _MOST_MISSED:
         raise ValueError(
-            f"prepare: support: {resolution.face_modes} polynomials over the face miss {missed:.0%} of matrix, must "
+            f"support: {resolution.face_modes} polynomials over the face miss {missed:.0%} of matrix, must "
             f"miss at most {_MOST_MISSED:.0%}: Resolution(face_modes={resolution.slices}) takes all of it"
         )
 
@@ -225,11 +221,10 @@ def holds_at(wanted: Float[Array, ""], torque: Float[Array, ""]) -> Bool[Array, 
     return jnp.abs(torque - wanted) <= _SAME_TORQUE * jnp.abs(wanted)
 
 
-def check_torque(owner: str, wanted: Float[Array, ""] | None, torque: Float[Array, "*loads"]) -> None:
+def check_torque(wanted: Float[Array, ""] | None, torque: Float[Array, "*loads"]) -> None:
     """Refuses torques at which a support that belongs to one does not hold, as far as all are known.
 
     Args:
-        owner: the function that is asked, for messages.
         wanted: torque of the gearbox whose shafts are the support [N m]; None where there is no such support.
         torque: on the pinion [N m].
 
@@ -242,6 +237,6 @@ def check_torque(owner: str, wanted: Float[Array, ""] | None, torque: Float[Arra
     others = np.atleast_1d(given)[~np.isclose(np.atleast_1d(given), known, rtol=_SAME_TORQUE, atol=0.0)]
     if len(others):
         raise ValueError(
-            f"{owner}: torque = {float(others[0]):g} N m, but the gearbox that supports the gears has {float(known):g} "
+            f"torque = {float(others[0]):g} N m, but the gearbox that supports the gears has {float(known):g} "
             "N m on this pinion: prepare with the gearbox at that torque"
         )

@@ -40,11 +40,9 @@ def flank_table(
     sizes = kinematics.resolution
     wanted = (sizes.pairs, sizes.slices, sizes.positions)
     if jnp.shape(field) != wanted:
-        raise ValueError(
-            f"flank_table: field has shape {jnp.shape(field)}, must be {wanted} (pairs, slices, positions)"
-        )
+        raise ValueError(f"field has shape {jnp.shape(field)}, must be {wanted} (pairs, slices, positions)")
     if gear not in ("pinion", "wheel"):
-        raise ValueError(f'flank_table: gear = {gear!r} must be "pinion" or "wheel"')
+        raise ValueError(f'gear = {gear!r} must be "pinion" or "wheel"')
     # the last pair is the first along the path; every roll length beyond the active profile only continues the table
     path = kinematics.path[::-1].reshape(-1)
     inside = kinematics.outside[::-1].reshape(-1) <= 0

@@ -1,5 +1,6 @@
 """A prepared mesh: everything that depends neither on the modification nor on the torque."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any, TypedDict, TypeVar, Unpack
 
@@ -10,16 +11,24 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ..compliance import AbstractCompliance, default_compliance
-from ..compliance.hertz import contact_geometry
-from ..compliance.plane import contact_plane
-from ..compliance.toothload import tooth_load
+from ..compliance.hertz import ContactGeometry, contact_geometry
+from ..compliance.plane import Plane, contact_plane
+from ..compliance.toothload import ToothLoad, tooth_load
 from ..geometry import GearPair, Margins, Outline, PathOfContact, explicit, margins_between, outline, path_of_contact
 from ..microgeometry import Flank
 from ..numerics import AbstractSpring, Given, SliceCoupling, changed, on_both, over_slices, program
 from ..numerics.programs import begin
 from .covering import check_cover, closing, helical_slices, pairs_alternate, pairs_for
-from .face_coupling import check_modes, check_support, coupling_of, ends_together, slices_alike, spreading_of
-from .kinematics import Kinematics, Side, contacts, kinematics, sides
+from .face_coupling import (
+    Spreading,
+    check_modes,
+    check_support,
+    coupling_of,
+    ends_together,
+    slices_alike,
+    spreading_of,
+)
+from .kinematics import Contacts, Kinematics, Side, contacts, kinematics, sides
 from .resolution import Resolution
 from .status import Status, Statuses, status_of
 from .support import AbstractSupport
@@ -31,28 +40,26 @@ class Gears(eqx.Module):
     Attributes:
         outlines: of their teeth.
         margins: how far the pair is from what cannot run.
-        compliance: the model, with what it knows of these gears alone.
     """
 
     outlines: tuple[Outline, Outline]
     margins: Margins
-    compliance: AbstractCompliance
+
+
+# Programs of their own, so that little is compiled twice: the gears are the same for all numbers of positions and
+# slices, and the places of the contacts for all compliances.
+@program
+def _gears_of(pair: GearPair) -> Gears:
+    """Both gears of an `explicit` pair."""
+    outlines = on_both(outline, pair.pinion, pair.wheel)
+    path = path_of_contact(pair, outlines)
+    return Gears(outlines, margins_between(*outlines, path, pair.center_distance, pair.face_overlap))
 
 
 @program
-def gears_of(pair: GearPair, compliance: AbstractCompliance, count: int) -> Gears:
-    """Both gears of an `explicit` pair.
-
-    A program of its own: half of what a mesh compiles is the same for all numbers of positions and slices.
-
-    Args:
-        pair: gear pair.
-        compliance: compliance model.
-        count: tooth pairs that are carried along.
-    """
-    outlines = on_both(outline, pair.pinion, pair.wheel)
-    margins = margins_between(*outlines, path_of_contact(pair, outlines), pair.center_distance, pair.face_overlap)
-    return Gears(outlines, margins, compliance.of_gears(*outlines, count))
+def _for_gears(compliance: AbstractCompliance, gears: Gears, count: int) -> AbstractCompliance:
+    """The compliance for these gears alone; `count` tooth pairs are carried along."""
+    return compliance.of_gears(*gears.outlines, count)
 
 
 Scalar = Float[Array, ""]
@@ -256,10 +263,7 @@ def prepare_from(
     even: bool,
 ) -> Mesh:
     """The mesh over the base pitch that begins with a mesh position [base pitches]; `even` as of the mesh."""
-    given = explicit(pair)
-    gears = gears_of(given, compliance, resolution.chosen_pairs)
-    mesh = _arrays_of(first_phase, given, gears, resolution.of_arrays, support, even)
-    return _labelled(mesh, pair, compliance, resolution)
+    return _prepared(_run, first_phase, pair, compliance, resolution, support, even)
 
 
 def begin_mesh(
@@ -270,74 +274,141 @@ def begin_mesh(
     even: bool,
 ) -> Mesh | None:
     """Starts to compile what `prepare` runs; gives the mesh of shapes that it will make, see `begin`."""
-    given = explicit(pair)
-    gears = begin(gears_of, given, compliance, resolution.chosen_pairs)
-    made = begin(_arrays_of, np.zeros(()), given, gears, resolution.of_arrays, support, even)
-    return None if made is None else eqx.filter_eval_shape(_labelled, made, pair, compliance, resolution)
+    return _prepared(begin, np.zeros(()), pair, compliance, resolution, support, even)
 
 
-def _labelled(mesh: Mesh, pair: GearPair, compliance: AbstractCompliance, resolution: Resolution) -> Mesh:
-    """The mesh with what its program leaves out, so as to serve many."""
-    kinematics = changed(mesh.kinematics, pair=pair, resolution=resolution)
-    return changed(mesh, kinematics=kinematics, compliance=compliance)
+def _run(function: Callable[..., Any], *args: Any) -> Any:
+    return function(*args)
 
 
-@program
-def _arrays_of(
-    first_phase: Any,
+# Positions that the programs prepare at once, of meshes with a multiple of them: finer meshes then compile nothing.
+_AT_ONCE = 64
+
+
+def _prepared(
+    run: Callable[..., Any],
+    first_phase: Given,
     pair: GearPair,
-    gears: Gears,
+    compliance: AbstractCompliance,
     resolution: Resolution,
     support: AbstractSupport | None,
     even: bool,
-) -> Mesh:
-    """`prepare_from`, for an `explicit` pair and the sizes `of_arrays`."""
-    compliance, outlines = gears.compliance, gears.outlines
-    plane = contact_plane(compliance.plane)
+) -> Any:
+    """`prepare_from` by programs that `run` runs or begins; None where it begins nothing."""
+    given = explicit(pair)
+    gears = run(_gears_of, given)
+    if gears is None:
+        return None
+    known = run(_for_gears, compliance, gears, resolution.chosen_pairs)
+    count, left = divmod(resolution.positions, _AT_ONCE)
+    traced = any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves((first_phase, given, known, support)))
+    if left or traced:
+        count = 1
+    sizes = changed(resolution.of_arrays, positions=resolution.positions // count)
+    made = []
+    for number in range(count):
+        first = first_phase + number / resolution.positions if number else first_phase
+        places = run(_places_of, first, given, gears.outlines, sizes, contact_plane(compliance.plane), even)
+        made.append(run(_arrays_of, places, gears.margins, known, support, even))
+    mesh = made[0]
+    if count > 1:
+        mesh = eqx.tree_at(_by_position, mesh, run(_joined, [_by_position(part) for part in made]))
+    # what the programs leave out, so as to serve many
+    return changed(mesh, kinematics=changed(mesh.kinematics, pair=pair, resolution=resolution), compliance=compliance)
+
+
+class _Places(eqx.Module):
+    """All of a mesh that does not depend on its compliance.
+
+    Attributes:
+        kinematics, sides, outer_steps: as of the mesh.
+        points, outer: contacts of the pairs carried along, and of those behind and ahead of them.
+        loads: on pinion and wheel, fields of shape (pairs, positions), of helical gears those of all slices in a row.
+        contact: flanks at the contacts.
+        spreading: of loads over the face.
+    """
+
+    kinematics: Kinematics
+    sides: tuple[Side, Side]
+    points: Contacts
+    outer: Contacts
+    outer_steps: Float[Array, "2 *slices positions"]
+    loads: tuple[ToothLoad, ToothLoad]
+    contact: ContactGeometry
+    spreading: Spreading
+
+
+@program
+def _places_of(
+    first_phase: Any,
+    pair: GearPair,
+    outlines: tuple[Outline, Outline],
+    resolution: Resolution,
+    plane: Plane,
+    even: bool,
+) -> _Places:
+    """The places of an `explicit` pair in the sizes `of_arrays`; `plane` is that of the contact."""
     moving = kinematics(pair, first_phase, resolution, plane, outlines)
-    contact = moving.path_of_contact
-    points = contacts(pair, contact, moving.contact_path, resolution.extended_contact)
+    path = moving.path_of_contact
+    points = contacts(pair, path, moving.contact_path, resolution.extended_contact)
     # what compliances know of are pairs at positions: of helical gears those of all slices
     rolls = [at.reshape(len(at), -1) for at in (points.pinion_roll_length, points.wheel_roll_length)]
     pinion, wheel = on_both(lambda given: tooth_load(*given), *zip(outlines, rolls))
-    geometry = contact_geometry(pinion, wheel, plane, pair.face_width)
-    law = compliance.law(geometry, pinion, wheel, points.beyond_tip.reshape(rolls[0].shape))
-    base_pitch = contact.base_pitch
-    beyond = jnp.stack([moving.contact_path[-1] - base_pitch, moving.contact_path[0] + base_pitch])
-    outer = contacts(pair, contact, beyond, resolution.extended_contact)
-    spreading = spreading_of(pair, outlines, resolution, even)
-    structures = spreading.shares[:, None, None, None] * compliance.structure(pinion, wheel)
-    width_factor, scale = geometry.width_factor[:, 0], None
-    if moving.helical:
-        shape = moving.contact_path.shape
-        law = jax.tree.map(lambda leaf: leaf.reshape(shape), law)
-        width_factor, structures = width_factor.reshape(shape), structures.reshape(*structures.shape[:-1], *shape[1:])
-        if resolution.is_coupled:
-            structures, scale = slices_alike(structures)
-    hubs = compliance.hub(pinion, wheel)
-    if not even:
-        hubs = hubs * (pair.face_width / jnp.stack([gear.face_width for gear in pair.gears]))
-    return Mesh(
+    beyond = jnp.stack([moving.contact_path[-1] - path.base_pitch, moving.contact_path[0] + path.base_pitch])
+    outer = contacts(pair, path, beyond, resolution.extended_contact)
+    return _Places(
         kinematics=moving,
-        compliance=compliance,
-        sides=sides(pair, contact, points),
-        corner_gap=points.corner_gap,
-        lever=points.lever,
-        margins=gears.margins,
-        outer_gap=closing(outer),
-        outer_lever=outer.lever,
+        sides=sides(pair, path, points),
+        points=points,
+        outer=outer,
         outer_steps=jnp.stack(
             [
                 _steps(points.pinion_roll_length[-1, ..., :2], outer.pinion_roll_length[0]),
                 _steps(points.wheel_roll_length[0, ..., :-3:-1], outer.wheel_roll_length[1]),
             ]
         ),
+        loads=(pinion, wheel),
+        contact=contact_geometry(pinion, wheel, plane, pair.face_width),
+        spreading=spreading_of(pair, outlines, resolution, even),
+    )
+
+
+@program
+def _arrays_of(
+    places: _Places, margins: Margins, compliance: AbstractCompliance, support: AbstractSupport | None, even: bool
+) -> Mesh:
+    """The mesh at its places, of a compliance for its gears."""
+    moving, points, (pinion, wheel) = places.kinematics, places.points, places.loads
+    law = compliance.law(places.contact, pinion, wheel, points.beyond_tip.reshape(pinion.roll_length.shape))
+    structures = places.spreading.shares[:, None, None, None] * compliance.structure(pinion, wheel)
+    width_factor, scale = places.contact.width_factor[:, 0], None
+    if moving.helical:
+        shape = moving.contact_path.shape
+        law = jax.tree.map(lambda leaf: leaf.reshape(shape), law)
+        width_factor, structures = width_factor.reshape(shape), structures.reshape(*structures.shape[:-1], *shape[1:])
+        if moving.resolution.is_coupled:
+            structures, scale = slices_alike(structures)
+    hubs = compliance.hub(pinion, wheel)
+    if not even:
+        pair = moving.pair
+        hubs = hubs * (pair.face_width / jnp.stack([gear.face_width for gear in pair.gears]))
+    slopes = compliance.slope(pinion, wheel)
+    return Mesh(
+        kinematics=moving,
+        compliance=compliance,
+        sides=places.sides,
+        corner_gap=points.corner_gap,
+        lever=points.lever,
+        margins=margins,
+        outer_gap=closing(places.outer),
+        outer_lever=places.outer.lever,
+        outer_steps=places.outer_steps,
         structure=structures[0] + structures[1],
         law=law,
         width_factor=width_factor,
         hub=jnp.sum(hubs),
         slice_width=moving.slice_width,
-        coupling=coupling_of(moving, spreading, structures[1], scale, support, compliance.slope(pinion, wheel)),
+        coupling=coupling_of(moving, places.spreading, structures[1], scale, support, slopes),
         support=support,
         support_gap=None if support is None else support.gap(moving.face_coordinate).astype(moving.slice_width.dtype),
         support_torque=None if support is None else support.torque,
@@ -443,6 +514,18 @@ def _part(first: Array | np.ndarray, count: int, mesh: Mesh) -> Mesh:
     resolution = changed(moving.resolution, positions=positions // count)
     moved = replace(moving, first_phase=phase, resolution=resolution)
     return eqx.tree_at(lambda m: [*_by_position(m), m.kinematics], mesh, [*taken, moved])
+
+
+@program
+def _joined(parts: list[list[Array | AbstractSpring]]) -> list[Array | AbstractSpring]:
+    """`_by_position` of all positions of some meshes, each a little later than the one before; undoes `_part`."""
+
+    def join(*leaves: Array) -> Array:
+        return jnp.stack(leaves, axis=-1).reshape(*leaves[0].shape[:-1], -1)
+
+    found = jax.tree.map(join, *parts)
+    found[0] = found[0] * len(parts)  # as far out, over smaller steps
+    return found
 
 
 def _by_position(mesh: Mesh) -> list[Array | AbstractSpring]:

@@ -29,24 +29,22 @@ class OperatingPoint(Checked):
 Torque = Given | OperatingPoint  # a torque on the pinion [N m] alone, or with what belongs to it
 
 
-def operating_point_of(owner: str, torque: Torque, dtype: np.dtype) -> OperatingPoint:
+def operating_point_of(torque: Torque, dtype: np.dtype) -> OperatingPoint:
     """An operating point in the precision of a mesh, of a torque [N m] or of an operating point.
 
     Raises:
-        ValueError: for a negative or non-finite torque, or an array of torques; the message names the owner.
+        ValueError: for a negative or non-finite torque, or an array of torques.
     """
     if not isinstance(torque, OperatingPoint):
-        torque = real(torque, f"{owner}: torque")
+        torque = real(torque, "torque")
         if torque.ndim:
-            raise ValueError(
-                f"{owner}: torque has shape {torque.shape}, must be a single number; solve for many with jax.vmap"
-            )
+            raise ValueError(f"torque has shape {torque.shape}, must be a single number; solve for many with jax.vmap")
         known = concrete(torque)
         if known is not None and known < 0:
             raise ValueError(
-                f"{owner}: torque = {known:g} N m must be at least 0 N m; for the coast flanks prepare the pair's "
+                f"torque = {known:g} N m must be at least 0 N m; for the coast flanks prepare the pair's "
                 "`coast` and give the amount of the torque"
             )
-        check(owner, "torque", torque, "N m", low=0.0)
+        check("torque", torque, "N m", low=0.0)
         torque = OperatingPoint(torque)
     return jax.tree.map(lambda part: part.astype(dtype), torque)

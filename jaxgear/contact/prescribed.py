@@ -79,16 +79,14 @@ def solve_at(
         TypeError: for something else than a prepared mesh or a modification.
         ValueError: for a transmission error that is not finite or has another shape, and as `solve`.
     """
-    check_mesh("solve_at", mesh)
+    check_mesh(mesh)
     error, positions = real(transmission_error), mesh.resolution.positions
     if error.shape not in ((), (positions,)):
-        raise ValueError(
-            f"solve_at: transmission_error has shape {error.shape}, must be a single number or ({positions},)"
-        )
-    check("solve_at", "transmission_error", error, "um")
-    torque = operating_point_of("solve_at", torque, mesh.slice_width.dtype).torque
-    check_torque("solve_at", mesh.support_torque, torque)
-    flanks, prepared = flanks_of("solve_at", mesh, pinion, wheel), for_contact(mesh)
+        raise ValueError(f"transmission_error has shape {error.shape}, must be a single number or ({positions},)")
+    check("transmission_error", error, "um")
+    torque = operating_point_of(torque, mesh.slice_width.dtype).torque
+    check_torque(mesh.support_torque, torque)
+    flanks, prepared = flanks_of(mesh, pinion, wheel), for_contact(mesh)
     error = jnp.broadcast_to(error.astype(torque.dtype), (positions,))
 
     def first_contact(removed):

@@ -182,9 +182,9 @@ def end_relief_widths(face_width: Given, length: Given, slices: int = 11) -> tup
         ValueError: for numbers out of these ranges, where the relief is too short for whole numbers, and for more
             slices than a long relief leaves room for.
     """
-    whole("end_relief_widths", "slices", slices, low=2 * len(_END) + 1)
-    check("end_relief_widths", "face_width", face_width, "mm", low=0.0, open_low=True)
-    check("end_relief_widths", "length", length, "mm", low=0.0, high=float(face_width) / 3, open_low=True)
+    whole("slices", slices, low=2 * len(_END) + 1)
+    check("face_width", face_width, "mm", low=0.0, open_low=True)
+    check("length", length, "mm", low=0.0, high=float(face_width) / 3, open_low=True)
     middle, best = slices - 2 * len(_END), None
     for unit in range(1, _FINEST + 1):  # parts of the face in the narrowest slice
         wide = max(unit, round(float((_OVER_RELIEF * face_width / length - 2 * sum(_END)) * unit / middle)))
@@ -195,11 +195,11 @@ def end_relief_widths(face_width: Given, length: Given, slices: int = 11) -> tup
             best = missed, made
     if best is None:
         least = _OVER_RELIEF * float(face_width) / _MOST_PARTS
-        raise ValueError(f"end_relief_widths: length = {float(length):g} mm must be at least {least:g} mm on this face")
+        raise ValueError(f"length = {float(length):g} mm must be at least {least:g} mm on this face")
     missed, made = best
     if missed > _MISSED:
         raise ValueError(
-            f"end_relief_widths: slices = {slices} are too many for a relief of length = {float(length):g} mm on "
+            f"slices = {slices} are too many for a relief of length = {float(length):g} mm on "
             f"{float(face_width):g} mm: those between the reliefs would be narrower than those at their ends"
         )
     return made

@@ -72,10 +72,10 @@ def solve(
         ValueError: for a negative or non-finite torque, an array of torques, a modification that varies along the
             face on a mesh of one slice, or a torque that is not that of the gearbox which holds the gears.
     """
-    check_mesh("solve", mesh)
-    operating_point = operating_point_of("solve", torque, mesh.slice_width.dtype)
-    check_torque("solve", mesh.support_torque, operating_point.torque)
-    pinion, wheel = flanks_of("solve", mesh, pinion, wheel)
+    check_mesh(mesh)
+    operating_point = operating_point_of(torque, mesh.slice_width.dtype)
+    check_torque(mesh.support_torque, operating_point.torque)
+    pinion, wheel = flanks_of(mesh, pinion, wheel)
     # two programs: that of the contact, by far the longer one to compile, serves every kind of modification
     removed = material_of(mesh, operating_point.torque, pinion, wheel)
     cycle = _cycle(
@@ -107,13 +107,13 @@ def solve_removed(
         ValueError: for a negative or non-finite torque, an array of torques, removed material of another shape, or a
             torque that is not that of the gearbox which holds the gears.
     """
-    check_mesh("solve_removed", mesh)
-    operating_point = operating_point_of("solve_removed", torque, mesh.slice_width.dtype)
-    check_torque("solve_removed", mesh.support_torque, operating_point.torque)
+    check_mesh(mesh)
+    operating_point = operating_point_of(torque, mesh.slice_width.dtype)
+    check_torque(mesh.support_torque, operating_point.torque)
     shape = jnp.shape(removed.amount if isinstance(removed, RemovedMaterial) else removed)
     wanted = (mesh.resolution.pairs, mesh.resolution.slices, mesh.resolution.positions)
     if shape != wanted:
-        raise ValueError(f"solve_removed: removed has shape {shape}, must be {wanted} (pairs, slices, positions)")
+        raise ValueError(f"removed has shape {shape}, must be {wanted} (pairs, slices, positions)")
     removed = removed if isinstance(removed, RemovedMaterial) else as_removed(mesh.resolution, removed)
     return _cycle(
         mesh, operating_point, _solve_removed(for_contact(mesh), operating_point.torque, removed), pinion, wheel
@@ -167,9 +167,9 @@ def removed_material(
         ValueError: for a negative or non-finite torque, an array of torques, or a modification that varies along the
             face on a mesh of one slice.
     """
-    check_mesh("removed_material", mesh)
-    torque = operating_point_of("removed_material", torque, mesh.slice_width.dtype).torque
-    pinion, wheel = flanks_of("removed_material", mesh, pinion, wheel)
+    check_mesh(mesh)
+    torque = operating_point_of(torque, mesh.slice_width.dtype).torque
+    pinion, wheel = flanks_of(mesh, pinion, wheel)
     return material_of(mesh, torque, pinion, wheel)
 
 
@@ -206,14 +206,14 @@ def begin_contact(
         begin(_solve_removed, eqx.filter_eval_shape(for_contact, mesh), np.zeros((), dtype), nothing)
 
 
-def check_mesh(owner: str, mesh: object) -> None:
+def check_mesh(mesh: object) -> None:
     """Raises a one-line `TypeError` for something else than a prepared mesh."""
     if not isinstance(mesh, Mesh):
-        raise TypeError(f"{owner}: mesh is a {type(mesh).__name__}, must be a Mesh: jaxgear.prepare makes one")
+        raise TypeError(f"mesh is a {type(mesh).__name__}, must be a Mesh: jaxgear.prepare makes one")
 
 
 def flanks_of(
-    owner: str, mesh: Mesh, pinion: AbstractModification | None, wheel: AbstractModification | None
+    mesh: Mesh, pinion: AbstractModification | None, wheel: AbstractModification | None
 ) -> tuple[AbstractModification, AbstractModification]:
     """Both modifications, that of the nominal involute for None.
 
@@ -225,7 +225,7 @@ def flanks_of(
     for gear, modification in (("pinion", pinion), ("wheel", wheel)):
         if modification is not None and not isinstance(modification, AbstractModification):
             raise TypeError(
-                f"{owner}: {gear} is a {type(modification).__name__}, must be a modification such as TipRelief, or None"
+                f"{gear} is a {type(modification).__name__}, must be a modification such as TipRelief, or None"
             )
         for term in terms(modification or NoModification()):
             if mesh.resolution.slices == 1 and term.varies_along_face:

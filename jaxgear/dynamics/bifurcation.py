@@ -173,10 +173,10 @@ def bifurcation_of(oscillator: Oscillator | Family, near: Bifurcation, *, steps:
         ValueError: for steps out of order.
     """
     if not isinstance(near, Bifurcation):
-        raise TypeError(f"bifurcation_of: near is of type {type(near).__name__}, must be a Bifurcation")
+        raise TypeError(f"near is of type {type(near).__name__}, must be a Bifurcation")
     dtype = near.orbit.displacement.dtype
     parameter = real(near.parameter).astype(dtype)
-    nodes = nodes_of("bifurcation_of", steps)
+    nodes = nodes_of(steps)
     z = scaled(near.orbit.start, near.orbit.mesh_frequency)
     normal = jnp.append(near.direction, 0.0) if near.kind == "fold" else first_direction(len(z) + 1, dtype, 1.0)
     known = critical(near.kind, np.linalg.eigvals(np.asarray(near.orbit.monodromy)))

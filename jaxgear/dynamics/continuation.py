@@ -110,10 +110,10 @@ def follow_orbits(
         ValueError: for a start that is no flip or lies outside of the range, or a number out of its range.
     """
     if direction not in ("up", "down"):
-        raise ValueError(f'follow_orbits: direction = {direction!r} must be "up" or "down"')
-    check("follow_orbits", "step", real(step), "", low=0.0, open_low=True, high=1.0)
-    whole("follow_orbits", "points", points, 2)
-    follower = _Follower(family_of(oscillator), start, within, direction, parameter, nodes_of("follow_orbits", steps))
+        raise ValueError(f'direction = {direction!r} must be "up" or "down"')
+    check("step", real(step), "", low=0.0, open_low=True, high=1.0)
+    whole("points", points, 2)
+    follower = _Follower(family_of(oscillator), start, within, direction, parameter, nodes_of(steps))
     return follower.followed(float(step), points, callback)
 
 
@@ -123,22 +123,22 @@ class _Follower:
     def __init__(self, family, start, within, direction, parameter, nodes):
         flip = isinstance(start, Bifurcation)
         if flip and start.kind != "flip":
-            raise ValueError(f'follow_orbits: start is a bifurcation of kind "{start.kind}", must be a flip')
+            raise ValueError(f'start is a bifurcation of kind "{start.kind}", must be a flip')
         orbit = start.orbit if isinstance(start, Bifurcation) else start
         if not isinstance(orbit, Orbit):
-            raise TypeError(f"follow_orbits: start is of type {type(start).__name__}, must be an Orbit or a flip")
+            raise TypeError(f"start is of type {type(start).__name__}, must be an Orbit or a flip")
         if parameter is not None and (flip or isinstance(family, OverSpeed)):
-            raise ValueError("follow_orbits: parameter belongs to a function of it that starts from an orbit")
+            raise ValueError("parameter belongs to a function of it that starts from an orbit")
         given = start.parameter if flip else orbit.mesh_frequency if parameter is None else parameter
         self.family, self.periods = family, orbit.periods * (2 if flip else 1)
         dtype = orbit.displacement.dtype
         self.nodes, at = nodes, real(given).astype(dtype)
         self.low, self.high = (float(end) for end in within)
-        check("follow_orbits", "parameter of the start", at, "", low=self.low, high=self.high)
+        check("parameter of the start", at, "", low=self.low, high=self.high)
         self.scales, place, ahead = _first(orbit.start, orbit.mesh_frequency, at, direction == "up")
         self.point, self.orbit = self.at(place, ahead)
         if not bool(self.point.converged):
-            raise ValueError("follow_orbits: there is no orbit of the branch near the start")
+            raise ValueError("there is no orbit of the branch near the start")
         if flip:
             self.point = self.point._replace(tangent=jnp.append(start.direction, 0.0).astype(dtype))
         self.begin, self.tests = self.point, tests_of(self.point)

@@ -97,16 +97,16 @@ def force_and_mesh(
     reach: Given = _REACH,
 ) -> tuple[AbstractMeshForce, Mesh]:
     """`mesh_force`, and the mesh that it was made on."""
-    check_mesh("mesh_force", mesh)
-    torque = operating_point_of("mesh_force", torque, mesh.slice_width.dtype).torque
-    check("mesh_force", "torque", torque, "N m", low=0.0, open_low=True)
+    check_mesh(mesh)
+    torque = operating_point_of(torque, mesh.slice_width.dtype).torque
+    check("torque", torque, "N m", low=0.0, open_low=True)
     series = _number("compliance", compliance, "um/N", mesh, low=0.0)
     farthest = _number("reach", reach, "", mesh, low=1.0)
     if model not in get_args(Model):
         wanted = ", ".join(f'"{name}"' for name in get_args(Model))
-        raise ValueError(f"mesh_force: model = {model!r} must be one of {wanted}")
-    whole("mesh_force", "levels", levels, 4, 4096)
-    whole("mesh_force", "positions", positions, 4, 65536)
+        raise ValueError(f"model = {model!r} must be one of {wanted}")
+    whole("levels", levels, 4, 4096)
+    whole("positions", positions, 4, 65536)
     given, mesh = mesh, resized(mesh, positions=positions)
     both = (pinion, wheel), _coast_of(coast, (pinion, wheel))
     off = _besides(deviation, given, mesh)
@@ -121,9 +121,7 @@ def interpolated(deviation: Given, of: Mesh, mesh: Mesh) -> Float[Array, "pairs 
     """Material that deviations remove on another mesh of the same gears."""
     wanted = of.resolution.chosen_pairs, of.resolution.slices, of.resolution.positions
     if jnp.shape(deviation) != wanted:
-        raise ValueError(
-            f"mesh_force: deviation has shape {jnp.shape(deviation)}, must be {wanted} (pairs, slices, positions)"
-        )
+        raise ValueError(f"deviation has shape {jnp.shape(deviation)}, must be {wanted} (pairs, slices, positions)")
 
     def rows(field):  # of every slice: one pair follows the other on the path of contact, the last one first
         return jnp.moveaxis(field[::-1], 1, 0).reshape(field.shape[1], -1)
@@ -145,10 +143,8 @@ def _besides(deviation: Given | None, of: Mesh, mesh: Mesh) -> Array | None:
 def _number(name: str, value: Any, unit: str, mesh: Mesh, **limits) -> Scalar:
     value = real(value)
     if value.ndim:
-        raise ValueError(
-            f"mesh_force: {name} has shape {value.shape}, must be a single number; make many with jax.vmap"
-        )
-    check("mesh_force", name, value, unit, **limits)
+        raise ValueError(f"{name} has shape {value.shape}, must be a single number; make many with jax.vmap")
+    check(name, value, unit, **limits)
     return value.astype(mesh.slice_width.dtype)
 
 
@@ -156,7 +152,7 @@ def _coast_of(coast: Any, drive: Both) -> Both:
     if coast is None:
         return drive
     if not isinstance(coast, tuple) or len(coast) != 2:
-        raise TypeError(f"mesh_force: coast is {coast!r}, must be a tuple (pinion, wheel) of modifications, or None")
+        raise TypeError(f"coast is {coast!r}, must be a tuple (pinion, wheel) of modifications, or None")
     return coast
 
 
@@ -220,6 +216,6 @@ def _check_clearance(least: Scalar) -> None:
     known = concrete(least)
     if known is not None and known < -_JAMMED:
         raise ValueError(
-            f"mesh_force: the clearance between drive and coast flanks = {float(known):.4g} um must be at least 0 um: "
+            f"the clearance between drive and coast flanks = {float(known):.4g} um must be at least 0 um: "
             "the modifications add material, and the pair has too little backlash"
         )

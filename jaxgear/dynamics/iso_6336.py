@@ -100,13 +100,12 @@ def iso_dynamic_factor(
         run_in: share of the deviations that running in takes away, y_p and y_f over them; 0.075 for case-hardened or
             nitrided gears (without the standard's upper limits in um).
     """
-    owner = "iso_dynamic_factor"
-    check(owner, "torque", torque, "N m", low=0.0, open_low=True)
-    check(owner, "speed", speed, "rpm", low=0.0)
-    check(owner, "tip_relief", tip_relief, "um", low=0.0)
-    check(owner, "application_factor", application_factor, "", low=0.0, open_low=True)
-    check(owner, "reduced_mass", reduced_mass, "kg/mm", low=0.0, open_low=True)
-    check(owner, "run_in", run_in, "", low=0.0, high=1.0)
+    check("torque", torque, "N m", low=0.0, open_low=True)
+    check("speed", speed, "rpm", low=0.0)
+    check("tip_relief", tip_relief, "um", low=0.0)
+    check("application_factor", application_factor, "", low=0.0, open_low=True)
+    check("reduced_mass", reduced_mass, "kg/mm", low=0.0, open_low=True)
+    check("run_in", run_in, "", low=0.0, high=1.0)
     return _factor(
         pair,
         real(torque),
@@ -114,7 +113,7 @@ def iso_dynamic_factor(
         real(tip_relief),
         real(application_factor),
         real(run_in),
-        *_deviations(owner, pair, quality_class, deviations),
+        *_deviations(pair, quality_class, deviations),
         optional_real(reduced_mass),
     )
 
@@ -157,14 +156,13 @@ def transverse_load_factors(
         dynamic_factor: K_v.
         face_load_factor: K_Hbeta.
     """
-    owner = "transverse_load_factors"
-    check(owner, "torque", torque, "N m", low=0.0, open_low=True)
-    check(owner, "dynamic_factor", dynamic_factor, "", low=0.0, open_low=True)
-    check(owner, "face_load_factor", face_load_factor, "", low=0.0, open_low=True)
-    check(owner, "application_factor", application_factor, "", low=0.0, open_low=True)
-    check(owner, "run_in", run_in, "", low=0.0, high=1.0)
+    check("torque", torque, "N m", low=0.0, open_low=True)
+    check("dynamic_factor", dynamic_factor, "", low=0.0, open_low=True)
+    check("face_load_factor", face_load_factor, "", low=0.0, open_low=True)
+    check("application_factor", application_factor, "", low=0.0, open_low=True)
+    check("run_in", run_in, "", low=0.0, high=1.0)
     load = _line_load(pair, real(torque), real(application_factor))
-    pitch, form = _deviations(owner, pair, quality_class, deviations)
+    pitch, form = _deviations(pair, quality_class, deviations)
     deviation = jnp.maximum(pitch, form) - pitch * real(run_in)
     moved = iso_stiffness(pair, load).mesh * deviation / (load * real(dynamic_factor) * real(face_load_factor))
     along, total = path_of_contact(pair).contact_ratio, _total_contact_ratio(pair)
@@ -227,13 +225,13 @@ def factor_of(
     return jnp.where(resonance_ratio <= main_begins, low, upper)
 
 
-def _deviations(owner: str, pair: GearPair, quality_class, given) -> tuple[Scalar, Scalar]:
+def _deviations(pair: GearPair, quality_class, given) -> tuple[Scalar, Scalar]:
     """f_pb and f_falpha [um], the larger of both gears': given, of a class, or zero."""
     if given is not None:
         if quality_class is not None:
-            raise ValueError(f"{owner}: deviations have no effect beside quality_class = {quality_class}, give either")
+            raise ValueError(f"deviations have no effect beside quality_class = {quality_class}, give either")
         for value in given:
-            check(owner, "deviations", value, "um", low=0.0)
+            check("deviations", value, "um", low=0.0)
         return real(given[0]), real(given[1])
     if quality_class is None:
         return real(0.0), real(0.0)

@@ -154,13 +154,13 @@ def mesh_tables(
         TypeError: for something else than a prepared mesh or modifications.
         ValueError: in one line for a number outside its range, and where `mesh_force` raises one.
     """
-    check_mesh("mesh_tables", mesh)
+    check_mesh(mesh)
     most = (mesh.resolution.positions - 1) // 2
-    count = min(_ORDERS, most) if orders is None else whole("mesh_tables", "orders", orders, 1, most)
-    load = operating_point_of("mesh_tables", torque, mesh.slice_width.dtype).torque
-    check("mesh_tables", "torque", load, "N m", low=0.0, open_low=True)
+    count = min(_ORDERS, most) if orders is None else whole("orders", orders, 1, most)
+    load = operating_point_of(torque, mesh.slice_width.dtype).torque
+    check("torque", load, "N m", low=0.0, open_low=True)
     every = np.unique([float(load), *np.asarray(torques, float).ravel()])
-    check("mesh_tables", "torques", jnp.asarray(every), "N m", low=0.0)
+    check("torques", jnp.asarray(every), "N m", low=0.0)
     made = mesh_force(mesh, load, pinion=pinion, wheel=wheel, positions=positions, levels=levels)
     cycles = [solve(mesh, each, pinion=pinion, wheel=wheel) for each in jnp.asarray(every, load.dtype)]
     error = jnp.stack([cycle.transmission_error for cycle in cycles])

@@ -52,8 +52,8 @@ def motion(
         TypeError: for something else than an `Oscillator`.
         ValueError: for a mesh frequency that is not positive, a start of another shape or steps out of order.
     """
-    frequency, start, nodes = checked("motion", oscillator, mesh_frequency, start, steps)
-    return _moved(oscillator, frequency, start, nodes, whole("motion", "periods", periods))
+    frequency, start, nodes = checked(oscillator, mesh_frequency, start, steps)
+    return _moved(oscillator, frequency, start, nodes, whole("periods", periods))
 
 
 @kernel
@@ -125,30 +125,29 @@ def run_up(
         ValueError: in one line for a number outside its range, a change too short for so many samples, or what is
             being traced.
     """
-    owner = "run_up"
-    low, high = _number(owner, "first", first, "Hz"), _number(owner, "last", last, "Hz")
-    time = _number(owner, "duration", duration, "s")
-    samples = whole(owner, "samples", samples)
-    check_single(owner, oscillator)
+    low, high = _number("first", first, "Hz"), _number("last", last, "Hz")
+    time = _number("duration", duration, "s")
+    samples = whole("samples", samples)
+    check_single(oscillator)
     cycles = int(np.floor((low + high) / 2 * time / samples))
     if cycles < 1:
         raise ValueError(
-            f"{owner}: duration = {time:g} s holds {(low + high) / 2 * time:.3g} mesh cycles, must be at least one for "
+            f"duration = {time:g} s holds {(low + high) / 2 * time:.3g} mesh cycles, must be at least one for "
             f"each of {samples} samples"
         )
-    size = steps_for(oscillator, [min(low, high)])[0] if steps is None else whole(owner, "steps", steps, low=8)
+    size = steps_for(oscillator, [min(low, high)])[0] if steps is None else whole("steps", steps, low=8)
     if size % 2:
-        raise ValueError(f"{owner}: steps = {size} must be even")
+        raise ValueError(f"steps = {size} must be even")
     dtype = oscillator.mass.dtype
     ends = jnp.asarray([low, high], dtype)
-    return _run(oscillator, start_of(owner, oscillator, start), ends, jnp.asarray(cycles), samples, size)
+    return _run(oscillator, start_of(oscillator, start), ends, jnp.asarray(cycles), samples, size)
 
 
-def _number(owner: str, name: str, value, unit: str) -> float:
+def _number(name: str, value, unit: str) -> float:
     known = concrete(real(value))
     if known is None or known.ndim:
-        raise ValueError(f"{owner}: {name} must be one concrete number")
-    check(owner, name, known, unit, low=0.0, open_low=True)
+        raise ValueError(f"{name} must be one concrete number")
+    check(name, known, unit, low=0.0, open_low=True)
     return float(known)
 
 

@@ -145,8 +145,8 @@ def find_orbit(
         TypeError: for something else than an `Oscillator`.
         ValueError: for a mesh frequency that is not positive, a start of another shape or steps out of order.
     """
-    frequency, start, nodes = checked("find_orbit", oscillator, mesh_frequency, start, steps)
-    return _found(oscillator, frequency, start, nodes, whole("find_orbit", "periods", periods))
+    frequency, start, nodes = checked(oscillator, mesh_frequency, start, steps)
+    return _found(oscillator, frequency, start, nodes, whole("periods", periods))
 
 
 def settle(
@@ -163,8 +163,8 @@ def settle(
     Raises:
         TypeError, ValueError: as `find_orbit`.
     """
-    frequency, start, nodes = checked("settle", oscillator, mesh_frequency, start, steps)
-    return _settled(oscillator, frequency, start, nodes, whole("settle", "cycles", cycles, 0))
+    frequency, start, nodes = checked(oscillator, mesh_frequency, start, steps)
+    return _settled(oscillator, frequency, start, nodes, whole("cycles", cycles, 0))
 
 
 def steady_orbit(
@@ -190,8 +190,8 @@ def steady_orbit(
     Raises:
         TypeError, ValueError: as `find_orbit`.
     """
-    frequency, start, nodes = checked("steady_orbit", oscillator, mesh_frequency, start, steps)
-    settle, periods = whole("steady_orbit", "settle", settle, 0), whole("steady_orbit", "periods", periods)
+    frequency, start, nodes = checked(oscillator, mesh_frequency, start, steps)
+    settle, periods = whole("settle", settle, 0), whole("periods", periods)
     return settled_orbit(oscillator, frequency, start, nodes, settle, periods)
 
 
@@ -223,10 +223,10 @@ def steady_orbits(
     frequencies, (x, v) = real(mesh_frequencies), (real(part) for part in start)
     if frequencies.ndim != 1 or x.shape[:1] != frequencies.shape:
         raise ValueError(
-            f"steady_orbits: mesh_frequencies have shape {frequencies.shape} and the start {x.shape}, "
+            f"mesh_frequencies have shape {frequencies.shape} and the start {x.shape}, "
             "must be (speeds,) and (speeds, coordinates)"
         )
-    check("steady_orbits", "mesh_frequencies", frequencies, "Hz", low=0.0, open_low=True)
+    check("mesh_frequencies", frequencies, "Hz", low=0.0, open_low=True)
 
     def at(frequency, x, v):
         return steady_orbit(oscillator, frequency, (x, v), settle=settle, periods=periods, steps=steps)

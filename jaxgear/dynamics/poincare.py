@@ -50,9 +50,7 @@ Start = Sequence[Numbers]  # displacements [um] and velocities [um/s]
 _Tree = TypeVar("_Tree")
 
 
-def checked(
-    owner: str, oscillator: Oscillator, mesh_frequency: Given, start: Start, steps: Numbers
-) -> tuple[Scalar, State, Nodes]:
+def checked(oscillator: Oscillator, mesh_frequency: Given, start: Start, steps: Numbers) -> tuple[Scalar, State, Nodes]:
     """Mesh frequency and start as arrays of the oscillator's type, and checked steps (`nodes_of`).
 
     Raises:
@@ -60,39 +58,39 @@ def checked(
         ValueError: for a mesh frequency that is not positive, a start of another shape or steps out of order.
     """
     if not isinstance(oscillator, Oscillator):
-        raise TypeError(f"{owner}: oscillator is of type {type(oscillator).__name__}, must be an Oscillator")
+        raise TypeError(f"oscillator is of type {type(oscillator).__name__}, must be an Oscillator")
     frequency = real(mesh_frequency)
     if frequency.shape != ():
         raise ValueError(
-            f"{owner}: mesh_frequency has shape {frequency.shape}, must be a single number; make many with jax.vmap"
+            f"mesh_frequency has shape {frequency.shape}, must be a single number; make many with jax.vmap"
         )
-    check(owner, "mesh_frequency", frequency, "Hz", low=0.0, open_low=True)
+    check("mesh_frequency", frequency, "Hz", low=0.0, open_low=True)
     shape = oscillator.mass.shape
     if not isinstance(start, tuple | list) or len(start) != 2:
-        raise ValueError(f"{owner}: start must be displacements and velocities (x, v)")
+        raise ValueError("start must be displacements and velocities (x, v)")
     parts = [real(part) for part in start]
     for name, part in zip(("displacements", "velocities"), parts):
         if part.shape != shape:
-            raise ValueError(f"{owner}: {name} of start have shape {part.shape}, must be {shape}")
+            raise ValueError(f"{name} of start have shape {part.shape}, must be {shape}")
     dtype = jnp.result_type(oscillator.mass, frequency)
     x, v = (part.astype(dtype) for part in parts)
-    return frequency.astype(dtype), (x, v), nodes_of(owner, steps)
+    return frequency.astype(dtype), (x, v), nodes_of(steps)
 
 
-def nodes_of(owner: str, steps: Numbers) -> Nodes:
+def nodes_of(steps: Numbers) -> Nodes:
     """Checked input of `steps_at`: number of steps, or nodes from 0 to 1 [base pitches].
 
     Raises:
         ValueError: for fewer than two steps, or nodes that do not increase from 0 to 1.
     """
     if isinstance(steps, int | np.integer):
-        return whole(owner, "steps", steps, 2)
+        return whole("steps", steps, 2)
     nodes = real(steps)
     if nodes.ndim != 1 or len(nodes) < 3:
-        raise ValueError(f"{owner}: steps have shape {nodes.shape}, must be a whole number or at least 3 nodes")
+        raise ValueError(f"steps have shape {nodes.shape}, must be a whole number or at least 3 nodes")
     known = concrete(nodes)
     if known is not None and (known[0] != 0 or known[-1] != 1 or (np.diff(known) <= 0).any()):
-        raise ValueError(f"{owner}: nodes of steps must increase from 0 to 1 base pitch")
+        raise ValueError("nodes of steps must increase from 0 to 1 base pitch")
     return nodes
 
 

@@ -30,21 +30,20 @@ AT_SPEED = tuple(name for name, *_ in _FIELDS)  # at the speed of the operating 
 
 def _numbers(field: str, at_speed: bool, analysis: Analysis, dynamics: Dynamics) -> Numbers:
     """The numbers of a design, whose worst counts."""
-    name = field if at_speed else f"worst_{field}"
     # all quantities of the same settings come from one sweep
-    found, converged = analysis.once(dynamics, ("runs", at_speed), lambda: _swept(name, at_speed, analysis, dynamics))
+    found, converged = analysis.once(dynamics, ("runs", at_speed), lambda: _swept(at_speed, analysis, dynamics))
     # a map of contacts that were not found is no force
     return jnp.where(converged, getattr(found, field), jnp.nan)
 
 
-def _swept(name: str, at_speed: bool, analysis: Analysis, dynamics: Dynamics) -> tuple[SteadyNumbers, Bool[Array, ""]]:
-    mesh, speed = analysis.mesh_for(name), analysis.operating_point.speed
+def _swept(at_speed: bool, analysis: Analysis, dynamics: Dynamics) -> tuple[SteadyNumbers, Bool[Array, ""]]:
+    mesh, speed = analysis.prepared_mesh, analysis.operating_point.speed
     if at_speed:
         if speed is None:
-            raise ValueError(f"{name}: needs a speed, solve with OperatingPoint(torque, speed)")
+            raise ValueError("needs a speed, solve with OperatingPoint(torque, speed)")
         frequency = mesh_frequency(mesh.pair.pinion.teeth, speed)
         dynamics = replace(dynamics, mesh_frequencies=frequency[None])
-    torque, deviation = analysis.cycle.torque, analysis.deviation(name)
+    torque, deviation = analysis.cycle.torque, analysis.deviation
     oscillator, _ = dynamics.oscillator_and_mesh(mesh, torque, **analysis.flanks, deviation=deviation)
     return dynamics.numbers(oscillator), oscillator.converged
 

@@ -67,11 +67,11 @@ def revolution_force(revolution: Revolution, model: RevolutionModel = "varying s
         ValueError: for another model, or a revolution after which the teeth do not meet as before.
     """
     if model not in get_args(RevolutionModel):
-        raise ValueError(f'revolution_force: model = {model!r} must be "varying stiffness" or "tangent"')
+        raise ValueError(f'model = {model!r} must be "varying stiffness" or "tangent"')
     error, windows = revolution.transmission_error, revolution.windows
     if error.ndim != 1 or not revolution.repeats:
         raise ValueError(
-            f"revolution_force: {windows} base pitches are no whole revolutions of all gears whose teeth differ, or "
+            f"{windows} base pitches are no whole revolutions of all gears whose teeth differ, or "
             'revolution is a batch: solve one over "hunting"'
         )
     first, status = revolution.phase[0] / windows, jnp.max(revolution.status)

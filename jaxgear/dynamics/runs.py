@@ -19,10 +19,10 @@ from .speed_sweep import check_single, checked_frequencies, prepared, steps_for,
 _SIDE_BY_SIDE, _SIDE_BY_SIDE_ELSEWHERE = 32, 4096
 
 
-def side_by_side(owner: str, batch: int | None) -> int:
+def side_by_side(batch: int | None) -> int:
     """Oscillators that advance side by side on a device; None for as many as suit it."""
     elsewhere = jax.local_devices()[0].platform != "cpu"
-    return whole(owner, "batch", (_SIDE_BY_SIDE_ELSEWHERE if elsewhere else _SIDE_BY_SIDE) if batch is None else batch)
+    return whole("batch", (_SIDE_BY_SIDE_ELSEWHERE if elsewhere else _SIDE_BY_SIDE) if batch is None else batch)
 
 
 Responses = dict[str, SpeedResponse]
@@ -53,11 +53,11 @@ def speed_runs(oscillator: Oscillator, mesh_frequencies: Numbers, runs: Mapping[
     Raises:
         ValueError: as `speed_sweep`.
     """
-    frequencies = checked_frequencies("speed_runs", mesh_frequencies)
-    check_single("speed_runs", oscillator)
+    frequencies = checked_frequencies(mesh_frequencies)
+    check_single(oscillator)
     if options.get("steps") is None:
         options["steps"] = steps_for(oscillator, frequencies)
-    sizes, limits = _prepared("speed_runs", frequencies, runs, options)
+    sizes, limits = _prepared(frequencies, runs, options)
     return _named(_of_one(oscillator, (frequencies, limits), sizes), _ways(runs))
 
 
@@ -92,23 +92,22 @@ def design_runs(
     Raises:
         ValueError: as `speed_sweep`, without `steps`, and for designs without a common leading axis.
     """
-    owner = "design_runs"
-    frequencies = checked_frequencies(owner, mesh_frequencies)
+    frequencies = checked_frequencies(mesh_frequencies)
     if options.get("steps") is None:
-        raise ValueError(f"{owner}: steps must be given, as steps_for of the stiffest design gives them")
-    return _in_batches(owner, make, designs, frequencies, runs, keep=keep, batch=batch, **options)
+        raise ValueError("steps must be given, as steps_for of the stiffest design gives them")
+    return _in_batches(make, designs, frequencies, runs, keep=keep, batch=batch, **options)
 
 
 def _in_batches(
-    owner: str, make, designs: Any, frequencies, runs: Mapping[str, Run], *, keep=None, batch: int | None, **options
+    make, designs: Any, frequencies, runs: Mapping[str, Run], *, keep=None, batch: int | None, **options
 ) -> Any:
     """`design_runs` under checked frequencies."""
     lengths = {jnp.shape(part)[:1] for part in jax.tree.leaves(designs)}
     if len(lengths) != 1 or not all(lengths) or lengths == {(0,)}:
-        raise ValueError(f"{owner}: designs must be arrays with one leading axis, the same and not 0 for all")
-    sizes, limits = _prepared(owner, frequencies, runs, options)
+        raise ValueError("designs must be arrays with one leading axis, the same and not 0 for all")
+    sizes, limits = _prepared(frequencies, runs, options)
     devices, (count,) = local_devices(), lengths.pop()
-    batch = min(side_by_side(owner, batch), -(-count // devices.size))
+    batch = min(side_by_side(batch), -(-count // devices.size))
 
     def batches(part):
         rows = padded(part, batch * devices.size)
@@ -141,28 +140,27 @@ def speed_sweeps(
         ValueError: in one line for a single oscillator, and as `speed_sweep`.
         TypeError: for an unknown option.
     """
-    owner = "speed_sweeps"
-    frequencies = checked_frequencies(owner, mesh_frequencies)
+    frequencies = checked_frequencies(mesh_frequencies)
     if oscillators.mass.ndim != 2:
         raise ValueError(
-            f"{owner}: oscillators have masses of shape {oscillators.mass.shape}, must be (oscillators, coordinates); "
+            f"oscillators have masses of shape {oscillators.mass.shape}, must be (oscillators, coordinates); "
             "make them with jax.vmap"
         )
     if options.get("steps") is None:
         options["steps"] = steps_for(oscillators, frequencies)
     run = Run(**{name: options.pop(name) for name in Run._fields if name in options})
-    return _in_batches(owner, _itself, oscillators, frequencies, {owner: run}, batch=batch, **options)[owner]
+    return _in_batches(_itself, oscillators, frequencies, {"": run}, batch=batch, **options)[""]
 
 
 def _itself(oscillator: Oscillator) -> Oscillator:
     return oscillator
 
 
-def _prepared(owner: str, frequencies, runs: Mapping[str, Run], options: dict):
+def _prepared(frequencies, runs: Mapping[str, Run], options: dict):
     """Static sizes of all runs, and the limits of each with a leading axis (runs,)."""
     most = max(len(run.kicks) for run in runs.values())
     ways = [run._replace(kicks=(*run.kicks, *[1.0] * (most - len(run.kicks)))) for run in runs.values()]
-    each = [prepared(owner, None, frequencies, **run._asdict(), **options) for run in ways]
+    each = [prepared(None, frequencies, **run._asdict(), **options) for run in ways]
     return each[0][0], jax.tree.map(lambda *parts: jnp.stack(parts), *(limits for _, limits in each))
 
 

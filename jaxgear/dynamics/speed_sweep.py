@@ -97,26 +97,26 @@ def speed_sweep(
         ValueError: in one line for frequencies that are no increasing list of positive numbers, an oscillator that
             holds many, or an option outside its range.
     """
-    frequencies = checked_frequencies("speed_sweep", mesh_frequencies)
-    check_single("speed_sweep", oscillator)
+    frequencies = checked_frequencies(mesh_frequencies)
+    check_single(oscillator)
     sizes, limits = prepared(
-        "speed_sweep", oscillator, frequencies, direction=direction, kick=kick, carry=carry, steps=steps,
+        oscillator, frequencies, direction=direction, kick=kick, carry=carry, steps=steps,
         tolerance=tolerance, most_cycles=most_cycles, most_periods=most_periods, points=points, orders=orders,
         kicks=kicks,
     )  # fmt: skip
-    found = swept(oscillator, frequencies, start_of("speed_sweep", oscillator, start), limits, sizes)
+    found = swept(oscillator, frequencies, start_of(oscillator, start), limits, sizes)
     return dataclasses.replace(found, direction=direction)
 
 
-def checked_frequencies(owner: str, given: Numbers) -> Speeds:
+def checked_frequencies(given: Numbers) -> Speeds:
     """Mesh frequencies as an array; raises a one-line `ValueError` unless they increase from above zero."""
     frequencies = real(given)
     if frequencies.ndim != 1 or not len(frequencies):
-        raise ValueError(f"{owner}: mesh_frequencies has shape {frequencies.shape}, must be a list of numbers")
-    check(owner, "mesh_frequencies", frequencies, "Hz", low=0.0, open_low=True)
+        raise ValueError(f"mesh_frequencies has shape {frequencies.shape}, must be a list of numbers")
+    check("mesh_frequencies", frequencies, "Hz", low=0.0, open_low=True)
     known = concrete(frequencies)
     if known is not None and (np.diff(known) <= 0).any():
-        raise ValueError(f"{owner}: mesh_frequencies must increase; direction gives the order of the sweep")
+        raise ValueError("mesh_frequencies must increase; direction gives the order of the sweep")
     return frequencies
 
 
@@ -130,11 +130,9 @@ def steps_for(oscillator: Oscillator, mesh_frequencies: Numbers) -> tuple[int, .
     Raises:
         ValueError: while being traced.
     """
-    frequencies = concrete(checked_frequencies("steps_for", mesh_frequencies))
+    frequencies = concrete(checked_frequencies(mesh_frequencies))
     if frequencies is None or any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves(oscillator)):
-        raise ValueError(
-            "steps_for: the oscillator is traced, steps cannot be chosen by its natural frequency; give steps"
-        )
+        raise ValueError("the oscillator is traced, steps cannot be chosen by its natural frequency; give steps")
     of_many = natural_frequencies
     for _ in range(oscillator.mass.ndim - 1):
         of_many = jax.vmap(of_many)
@@ -145,13 +143,11 @@ def steps_for(oscillator: Oscillator, mesh_frequencies: Numbers) -> tuple[int, .
     return tuple(int(_FEWEST_STEPS * 2**power) for power in doublings)
 
 
-def check_single(owner: str, oscillator: Oscillator) -> None:
+def check_single(oscillator: Oscillator) -> None:
     """Raises a one-line `ValueError` for many."""
     if oscillator.mass.ndim != 1:
         many = f"oscillators of shape {oscillator.mass.shape[:-1]}"
-        raise ValueError(
-            f"{owner}: oscillator holds {many}, must be one; many are for speed_sweeps or Dynamics.runs_of"
-        )
+        raise ValueError(f"oscillator holds {many}, must be one; many are for speed_sweeps or Dynamics.runs_of")
 
 
 class _Limits(NamedTuple):
@@ -166,7 +162,6 @@ class _Limits(NamedTuple):
 
 
 def prepared(
-    owner: str,
     oscillator: Oscillator | None,
     frequencies: Speeds,
     *,
@@ -183,25 +178,25 @@ def prepared(
 ) -> tuple[_Sizes, _Limits]:
     """Options of a sweep, checked: what is static and what is not; without an oscillator for given steps alone."""
     if direction not in ("up", "down"):
-        raise ValueError(f'{owner}: direction = {direction!r} must be "up" or "down"')
+        raise ValueError(f'direction = {direction!r} must be "up" or "down"')
     if not isinstance(carry, bool):
-        raise ValueError(f"{owner}: carry = {carry!r} must be True or False")
+        raise ValueError(f"carry = {carry!r} must be True or False")
     dtype = frequencies.dtype
     precision = float(jnp.finfo(dtype).eps)
     least_change = real(precision**0.5 if tolerance is None else tolerance)
     first, further = real(1.0 if kick is None else kick), real(kicks)
-    check(owner, "tolerance", least_change, "", low=precision, high=0.1)
-    check(owner, "kick", first, "", low=1.0, high=MOST_KICK)
+    check("tolerance", least_change, "", low=precision, high=0.1)
+    check("kick", first, "", low=1.0, high=MOST_KICK)
     if further.ndim != 1:
-        raise ValueError(f"{owner}: kicks has shape {further.shape}, must be a list of numbers")
-    check(owner, "kicks", further, "", low=1.0, high=MOST_KICK)
+        raise ValueError(f"kicks has shape {further.shape}, must be a list of numbers")
+    check("kicks", further, "", low=1.0, high=MOST_KICK)
     orders = tuple(float(order) for order in np.atleast_1d(np.asarray(orders, float)))
-    check(owner, "orders", np.asarray(orders), "", low=0.0, open_low=True)
-    most_cycles = whole(owner, "most_cycles", most_cycles)
-    most_periods, points = whole(owner, "most_periods", most_periods), whole(owner, "points", points)
+    check("orders", np.asarray(orders), "", low=0.0, open_low=True)
+    most_cycles = whole("most_cycles", most_cycles)
+    most_periods, points = whole("most_periods", most_periods), whole("points", points)
     if points < most_periods:
-        raise ValueError(f"{owner}: points = {points} must be at least most_periods = {most_periods}")
-    counts = _counts(owner, oscillator, frequencies, steps)
+        raise ValueError(f"points = {points} must be at least most_periods = {most_periods}")
+    counts = _counts(oscillator, frequencies, steps)
     sizes = _Sizes(max(counts), not carry, most_periods, points, orders)
     return sizes, _Limits(
         jnp.asarray(counts),
@@ -213,32 +208,30 @@ def prepared(
     )
 
 
-def _counts(owner, oscillator, frequencies, steps) -> tuple[int, ...]:
+def _counts(oscillator, frequencies, steps) -> tuple[int, ...]:
     if steps is None:
         return steps_for(oscillator, frequencies)
     if isinstance(steps, int | np.integer):
         steps = (steps,) * len(frequencies)
-    counts = tuple(whole(owner, "steps", count, low=8) for count in steps)
+    counts = tuple(whole("steps", count, low=8) for count in steps)
     if len(counts) != len(frequencies):
-        raise ValueError(
-            f"{owner}: steps has {len(counts)} numbers, must have one for each of {len(frequencies)} speeds"
-        )
+        raise ValueError(f"steps has {len(counts)} numbers, must have one for each of {len(frequencies)} speeds")
     for count in counts:
         if count % 2 or max(counts) % count:
-            raise ValueError(f"{owner}: steps = {count} must be even and divide the largest, {max(counts)}")
+            raise ValueError(f"steps = {count} must be even and divide the largest, {max(counts)}")
     return counts
 
 
-def start_of(owner: str, oscillator: Oscillator, start: State | None) -> State | None:
+def start_of(oscillator: Oscillator, start: State | None) -> State | None:
     """A given start, checked."""
     if start is None:
         return None
     shape = oscillator.mass.shape
     if not isinstance(start, tuple) or len(start) != 2 or any(jnp.shape(part) != shape for part in start):
-        raise ValueError(f"{owner}: start must be coordinates and velocities, each of shape {shape}")
+        raise ValueError(f"start must be coordinates and velocities, each of shape {shape}")
     x, v = (real(part) for part in start)
-    check(owner, "start", x, "um")
-    check(owner, "start", v, "um/s")
+    check("start", x, "um")
+    check("start", v, "um/s")
     return x, v
 
 

@@ -53,7 +53,7 @@ def equivalent_mass(pair: GearPair, inertias: Numbers | None = None) -> Scalar:
     Raises:
         ValueError: in one line for inertias that are not two positive numbers.
     """
-    return 1 / jnp.sum(1 / _masses("equivalent_mass", pair, inertias))
+    return 1 / jnp.sum(1 / _masses(pair, inertias))
 
 
 def torsional(
@@ -85,8 +85,8 @@ def torsional(
     Raises:
         ValueError: in one line for both or neither of damping and damping_ratio, or a number outside its range.
     """
-    mass, force = equivalent_mass(pair, inertias), _force("torsional", pair, torque)
-    c = _damping("torsional", mesh_force, mass, force, damping_ratio, damping, mean_stiffness)
+    mass, force = equivalent_mass(pair, inertias), _force(pair, torque)
+    c = _damping(mesh_force, mass, force, damping_ratio, damping, mean_stiffness)
     one = jnp.ones((1,), mass.dtype)
     return Oscillator(
         mesh_force=mesh_force, mass=mass * one, direction=one, load=force * one, mesh_damping=c, excitation=excitation
@@ -111,8 +111,8 @@ def two_gears(
     The torque of the wheel balances that of the pinion; arguments and errors of `torsional`. A component of a larger
     model: what is joined to the gears adds to `load`, `stiffness` and `damping`, or to what the vector field returns.
     """
-    masses, force = _masses("two_gears", pair, inertias), _force("two_gears", pair, torque)
-    c = _damping("two_gears", mesh_force, 1 / jnp.sum(1 / masses), force, damping_ratio, damping, mean_stiffness)
+    masses, force = _masses(pair, inertias), _force(pair, torque)
+    c = _damping(mesh_force, 1 / jnp.sum(1 / masses), force, damping_ratio, damping, mean_stiffness)
     direction = jnp.asarray([1.0, -1.0], masses.dtype)
     return Oscillator(
         mesh_force=mesh_force,
@@ -162,21 +162,19 @@ def on_bearings(
     Raises:
         ValueError: in one line as for `torsional`, and for a bearing that is not symmetric or not stiff.
     """
-    owner = "on_bearings"
-    mass, force = equivalent_mass(pair, inertias), _force(owner, pair, torque)
-    c = _damping(owner, mesh_force, mass, force, damping_ratio, damping, mean_stiffness)
+    mass, force = equivalent_mass(pair, inertias), _force(pair, torque)
+    c = _damping(mesh_force, mass, force, damping_ratio, damping, mean_stiffness)
     bodies = _pair_of_numbers(
-        owner, "masses", "kg", (_mass_of(pair.pinion), _mass_of(pair.wheel)) if masses is None else masses
+        "masses", "kg", (_mass_of(pair.pinion), _mass_of(pair.wheel)) if masses is None else masses
     )
-    held = _on_ground(owner, "bearing_stiffness", "N/um", bearing_stiffness, stiff=True)
+    held = _on_ground("bearing_stiffness", "N/um", bearing_stiffness, stiff=True)
     directions = len(held) // 2
     damped = None
     if bearing_damping is not None:
-        damped = _on_ground(owner, "bearing_damping", "N s/um", bearing_damping, stiff=False)
+        damped = _on_ground("bearing_damping", "N s/um", bearing_damping, stiff=False)
         if len(damped) != len(held):
             raise ValueError(
-                f"{owner}: bearing_damping is of {len(damped) // 2} directions, must be of {directions} as "
-                "bearing_stiffness"
+                f"bearing_damping is of {len(damped) // 2} directions, must be of {directions} as bearing_stiffness"
             )
     one = jnp.ones((1,), mass.dtype)
     centre = jnp.concatenate([one, 0 * one, -pair.path_slope[None]])[:directions]
@@ -192,64 +190,64 @@ def on_bearings(
     )
 
 
-def _masses(owner: str, pair: GearPair, inertias) -> Float[Array, "2"]:
+def _masses(pair: GearPair, inertias) -> Float[Array, "2"]:
     """Masses of pinion and wheel on the line of action [kg]."""
     given = (inertia_of(pair.pinion), inertia_of(pair.wheel)) if inertias is None else inertias
     radii = jnp.stack([pair.pinion.base_radius, pair.wheel.base_radius]) * _MM
-    return _pair_of_numbers(owner, "inertias", "kg m2", given) / radii**2
+    return _pair_of_numbers("inertias", "kg m2", given) / radii**2
 
 
-def _pair_of_numbers(owner: str, name: str, unit: str, given) -> Float[Array, "2"]:
+def _pair_of_numbers(name: str, unit: str, given) -> Float[Array, "2"]:
     if isinstance(given, tuple | list) and any(isinstance(part, jax.Array) for part in given):
         given = jnp.stack([real(part) for part in given])
     numbers = real(given)
     if numbers.shape != (2,):
-        raise ValueError(f"{owner}: {name} has shape {numbers.shape}, must be two numbers, of pinion and wheel")
-    check(owner, name, numbers, unit, low=0.0, open_low=True)
+        raise ValueError(f"{name} has shape {numbers.shape}, must be two numbers, of pinion and wheel")
+    check(name, numbers, unit, low=0.0, open_low=True)
     return numbers
 
 
-def _force(owner: str, pair: GearPair, torque) -> Scalar:
+def _force(pair: GearPair, torque) -> Scalar:
     """Static force on the line of action [N]."""
     torque = real(torque)
     if torque.ndim:
-        raise ValueError(f"{owner}: torque has shape {torque.shape}, must be a single number; make many with jax.vmap")
-    check(owner, "torque", torque, "N m", low=0.0, open_low=True)
+        raise ValueError(f"torque has shape {torque.shape}, must be a single number; make many with jax.vmap")
+    check("torque", torque, "N m", low=0.0, open_low=True)
     return torque / (pair.pinion.base_radius * _MM)
 
 
-def _damping(owner: str, mesh_force, mass, force, ratio, damping, stiffness) -> Scalar:
+def _damping(mesh_force, mass, force, ratio, damping, stiffness) -> Scalar:
     """Viscous damping of the DTE [N s/um]."""
     if (ratio is None) == (damping is None):
-        raise ValueError(f"{owner}: give either damping_ratio or damping [N s/um]")
+        raise ValueError("give either damping_ratio or damping [N s/um]")
     if ratio is None:
         if stiffness is not None:
-            raise ValueError(f"{owner}: mean_stiffness belongs to damping_ratio, damping is given")
+            raise ValueError("mean_stiffness belongs to damping_ratio, damping is given")
         damping = real(damping)
-        check(owner, "damping", damping, "N s/um", low=0.0)
+        check("damping", damping, "N s/um", low=0.0)
         return damping
     ratio = real(ratio)
-    check(owner, "damping_ratio", ratio, "", low=0.0, high=1.0)
+    check("damping_ratio", ratio, "", low=0.0, high=1.0)
     stiffness = mesh_force.mean_tangent_stiffness(force) if stiffness is None else real(stiffness)
-    check(owner, "mean_stiffness", stiffness, "N/um", low=0.0, open_low=True)
+    check("mean_stiffness", stiffness, "N/um", low=0.0, open_low=True)
     # stiffness and damping are per um, the mass is that of metres
     return 2 * ratio * jnp.sqrt(stiffness * mass / NEWTON)
 
 
-def _on_ground(owner: str, name: str, unit: str, given: Any, *, stiff: bool) -> Float[Array, "centres centres"]:
+def _on_ground(name: str, unit: str, given: Any, *, stiff: bool) -> Float[Array, "centres centres"]:
     """Matrix of two bearings at the coordinates of both centres."""
     given = real(given)
     if given.shape not in [(2, count, count) for count in DIRECTIONS]:
-        raise ValueError(f"{owner}: {name} has shape {given.shape}, must be {_BEARING}")
-    check(owner, name, given, unit)
+        raise ValueError(f"{name} has shape {given.shape}, must be {_BEARING}")
+    check(name, given, unit)
     known = concrete(given)
     if known is not None:
         if (np.abs(known - known.swapaxes(1, 2)) > 1e-9 * np.max(np.abs(known))).any():
-            raise ValueError(f"{owner}: {name} must be symmetric")
+            raise ValueError(f"{name} must be symmetric")
         least = float(np.min(np.linalg.eigvalsh(known)))
         if least < 0 or (stiff and least == 0):
             limit = "greater than 0" if stiff else "at least 0"
-            raise ValueError(f"{owner}: {name} has an eigenvalue of {least:g} {unit}, must be {limit} {unit}")
+            raise ValueError(f"{name} has an eigenvalue of {least:g} {unit}, must be {limit} {unit}")
     return jax.scipy.linalg.block_diag(*given)
 
 

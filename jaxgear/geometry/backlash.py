@@ -49,15 +49,15 @@ def pair_with_backlash(
             `GearPair` refuses.
     """
     if by not in _BY:
-        raise ValueError(f"pair_with_backlash: by = {by!r} must be one of {', '.join(_BY)}")
+        raise ValueError(f"by = {by!r} must be one of {', '.join(_BY)}")
     backlash, distance = real(backlash), optional_real(center_distance)
-    check("GearPair", "backlash", backlash, "um", low=0.0)
+    check("GearPair: backlash", backlash, "um", low=0.0)
     if by == "center_distance":
         if distance is not None:
             raise ValueError('GearPair: center_distance: cannot be given, by = "center_distance" finds it')
         distance = _distance(pinion, wheel, backlash / jnp.cos(pinion.base_helix_angle))
         return GearPair(pinion, wheel, distance, axial_offset=real(axial_offset))
-    check("GearPair", "center_distance", distance, "mm", low=0.0, open_low=True)
+    check("GearPair: center_distance", distance, "mm", low=0.0, open_low=True)
     play = _play(pinion, wheel, distance) * jnp.cos(pinion.base_helix_angle)
     _check_enough(backlash, play)
     missing = backlash - play

@@ -130,7 +130,7 @@ class Gear(Checked):
         limit = _tool_radius_limit(self)
         if self.root_radius is None:
             object.__setattr__(self, "root_radius", _usual_root_radius(self))
-        check("Gear", "root_radius", self.root_radius, "x module", low=0.0, high=limit)
+        check("Gear: root_radius", self.root_radius, "x module", low=0.0, high=limit)
         if self.grinding_allowance is not None:
             if self.protuberance is None:
                 raise ValueError("Gear: protuberance: missing, grinding_allowance needs it")
@@ -143,7 +143,7 @@ class Gear(Checked):
                 raise ValueError(f"Gear: {name}: missing, {other} needs it")
         if self.rim_thickness is not None:
             body = concrete(self.body_thickness)
-            check("Gear", "rim_thickness", self.rim_thickness, "mm", high=None if body is None else float(body))
+            check("Gear: rim_thickness", self.rim_thickness, "mm", high=None if body is None else float(body))
         for fault in shape_faults(self):
             raise ValueError(fault)
 
@@ -402,7 +402,7 @@ def with_diameters(gear: Gear) -> Gear:
     return changed(gear, **{name: real(diameters[name]) for name in names})
 
 
-def check_spur(owner: str, *gears: Gear) -> None:
+def check_spur(*gears: Gear) -> None:
     """Refuses helical gears, for what covers spur gears alone.
 
     Raises:
@@ -413,7 +413,7 @@ def check_spur(owner: str, *gears: Gear) -> None:
             assert gear.helix_angle is not None
             angle = concrete(gear.helix_angle)
             given = "is traced" if angle is None else f"= {float(np.ravel(angle)[0]):g} deg"
-            raise ValueError(f"{owner}: helix_angle {given}, must be 0 deg: spur gears alone are covered")
+            raise ValueError(f"helix_angle {given}, must be 0 deg: spur gears alone are covered")
 
 
 def virtual_gear(gear: Gear) -> Gear:

@@ -164,7 +164,7 @@ def read_flank(
         ValueError: for a base radius that is not positive, or beside a side.
         DesignFileError: when the file cannot be read, is no flank or not one of the side; the message is one line.
     """
-    check("read_flank", "base_radius", base_radius, "mm", low=0.0, open_low=True)
+    check("base_radius", base_radius, "mm", low=0.0, open_low=True)
     if side is not None and base_radius is not None:
         raise ValueError(f"read_flank: base_radius = {base_radius:g} mm has no effect beside side")
     with naming(path):

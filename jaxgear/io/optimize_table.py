@@ -14,15 +14,14 @@ from ..optimize import (
     Front,
     Optimum,
     Pareto,
-    free_form,
-    iterate_from_low_pressure,
-    iterate_transmission_error,
+    Problem,
     minimize,
     pareto,
 )
 from ..optimize.free_form import CURVES
 from ..optimize.refine import POSITIONS
 from ..optimize.rounding import check_steps, multiples
+from ..tolerance import ManufacturedGears
 from ..vocabulary import quantity_of
 from ..wear import WEAR_QUANTITIES, Wear
 from ..wear.quantities import MOST_LIVES
@@ -51,7 +50,7 @@ from .value_types import (
 )
 
 # They seek the flanks themselves.
-METHODS_WITHOUT_VARIABLES = ("te_iteration", "free_form")
+METHODS_WITHOUT_VARIABLES = tuple(name for name, cls in METHODS.items() if not cls.takes_variables)
 CURVE = "cubic"  # on which flanks without parameters are projected
 PARETO = "pareto"
 
@@ -80,44 +79,37 @@ class FactorialOptions(FileTable):
     )
 
 
-class IterationOptions(FileTable):
+_ITERATION = section_of(METHODS["te_iteration"], ("search",), most=(("steps", 1000),), open=False)
+_FREE_FORM = section_of(METHODS["free_form"], most=(("points", 500), ("steps", 10_000)), open=False)
+
+
+class _Projected(FileTable):
+    """Options of a method without variables.
+
+    Attributes:
+        curve: name of the curve that the flanks are projected on, such as "power"; "cubic" without it.
+    """
+
+    curve: str | None = entry(text())
+
+
+class IterationOptions(_Projected, _ITERATION):  # type: ignore[misc, valid-type]
     """Levels the transmission error by removing it from the flanks.
 
     Attributes:
         start: flanks of the first step: involutes ("unmodified"), the modifications of the file ("given"), or a relief
             designed for the lowest pressure ("low_pressure").
-        curve: name of the curve that the flanks are projected on, such as "power"; "cubic" without it.
     """
 
-    source = iterate_transmission_error
 
-    start: str = entry(choice("unmodified", "given", "low_pressure"), "unmodified")
-    max_relief: float = entry(positive("um"), 7.0)
-    max_pressure: float | None = entry(positive("MPa"))
-    rtol: float | None = entry(positive(""))
-    steps: int | None = entry(count(1, 1000))
-    curve: str | None = entry(text())
-
-
-class FreeFormOptions(FileTable):
-    """Finds the flanks with the least PPTE, of any form, by sequential linear programming.
-
-    Attributes:
-        curve: name of the curve that the flanks are projected on, such as "power"; "cubic" without it.
-    """
-
-    source = free_form
-
-    points: int | None = entry(count(4, 500))
-    max_relief: float | None = entry(positive("um"))
-    curvature: float | None = entry(real(Number(low=0.0)))
-    steps: int | None = entry(count(1, 10_000))
-    curve: str | None = entry(text())
+class FreeFormOptions(_Projected, _FREE_FORM):  # type: ignore[misc, valid-type]
+    """Finds the flanks with the least PPTE, of any form, by sequential linear programming."""
 
 
 def method_options() -> dict[str, type[FileTable]]:
     """The tables [optimize.<method>] of the methods that have one, of a user's own too: the fields of their classes."""
-    found = {name: section_of(cls, ("starts", "steps", "seed"), open=False) for name, cls in METHODS.items()}
+    shared = "starts", "steps", "seed"
+    found = {name: section_of(cls, shared, open=False) for name, cls in METHODS.items() if cls.takes_variables}
     found |= {"factorial": FactorialOptions, PARETO: section_of(Pareto)}
     found |= {"te_iteration": IterationOptions, "free_form": FreeFormOptions}
     return {name: section for name, section in found.items() if section.keys}
@@ -220,7 +212,12 @@ def optimize_of(design: DesignFile) -> OptimizeSection:
 
 def known_methods() -> tuple[str, ...]:
     """Names of all methods."""
-    return (*METHODS, PARETO, *METHODS_WITHOUT_VARIABLES)
+    return (*METHODS, PARETO)
+
+
+def _varies(name: str) -> bool:
+    """Whether a method seeks the best values of the variables of a file."""
+    return name in METHODS and METHODS[name].takes_variables
 
 
 def _made_by(name: str) -> type[Any]:
@@ -244,7 +241,7 @@ def _options_of(section: OptimizeSection, name: str, *, of_the_file: bool) -> di
     """The options of a method; the file may name others where it is not the file that asks for the method."""
     options = section.options(name)
     shared = {"starts": section.starts, "steps": section.steps, "seed": section.seed or 0}
-    taken = {field.name for field in dataclasses.fields(METHODS[name])} if name in METHODS else set()
+    taken = {field.name for field in dataclasses.fields(METHODS[name])} if _varies(name) else set()
     if of_the_file:
         why = f' with method "{name}"'
         section.refuse([key for key in ("starts", "steps") if key not in taken], why)
@@ -268,7 +265,6 @@ _QUICK: Mapping[str, dict[str, Any]] = {
     "adam": {"starts": 4, "steps": 40},
     "lbfgs": {"starts": 4, "steps": 30},
     "genetic": {"population": 20, "generations": 10},
-    "binary_genetic": {"population": 20, "generations": 10},
     "cma_es": {"population": 8, "generations": 20},
     "differential_evolution": {"population": 20, "generations": 10},
     "factorial": {"levels": 3},
@@ -286,7 +282,8 @@ class Search:
     Attributes:
         design: the design file.
         method: its name.
-        options: arguments of the function of the method, besides design, mesh and callback.
+        problem: arguments of `Problem` besides the mesh.
+        options: arguments of `minimize` or `pareto` besides problem and callback.
         curve: named curve on which the flanks of a method without parameters are projected; None for the others.
         verify: True if the designs are to be evaluated with the finite-element structure too; None where the gears can
             be meshed.
@@ -294,6 +291,7 @@ class Search:
 
     design: DesignFile
     method: str
+    problem: Mapping[str, Any]
     options: Mapping[str, Any]
     curve: str | None = None
     verify: bool | None = None
@@ -313,13 +311,14 @@ class Search:
         section = optimize_of(design)
         name = method or section.method or _DEFAULT_METHOD
         with naming(design.path):
-            options, curve = _arguments(design, section, name, of_the_file=method is None, quick=quick)
-        return cls(design, name, options, curve, False if quick else section.verify)
+            arguments = _arguments(design, section, name, of_the_file=method is None, quick=quick)
+        return cls(design, name, *arguments, False if quick else section.verify)
 
     @property
     def finer(self) -> int | None:
         """Positions of the finer mesh on which it ends; None where it stays on its mesh or chooses later."""
-        return self.options.get("positions", POSITIONS) if self.method in (*METHODS, PARETO) else None
+        ends_on_finer = _varies(self.method) or self.method == PARETO
+        return self.options.get("positions", POSITIONS) if ends_on_finer else None
 
     def over_life(self, settings: Wear) -> "Search | None":
         """The search of the same variables for the least mean PPTE over the life at the design torque.
@@ -327,38 +326,25 @@ class Search:
         One gradient search without rounding, since every step of it wears a life. None where flanks are sought without
         variables, and where the file asks for a quantity of worn flanks itself.
         """
-        asked = self.options.get("objective", "ppte")
-        if self.method not in METHODS or (isinstance(asked, Quantity) and asked.name in WEAR_QUANTITIES):
+        asked = self.problem.get("objective", "ppte")
+        if not _varies(self.method) or (isinstance(asked, Quantity) and asked.name in WEAR_QUANTITIES):
             return None
-        kept = {name: value for name, value in self.options.items() if name in ("constraints", "seed")}
-        kept |= {"torque": self.design.spectrum(OptimizeSection("optimize")), "positions": None}
-        kept |= {"objective": settings.quantity(_LASTING), "method": METHODS[_DEFAULT_METHOD](**_OVER_LIFE)}
-        return dataclasses.replace(self, method=_DEFAULT_METHOD, options=kept)
+        kept = {name: self.problem[name] for name in ("design", "bounds", "constraints")}
+        kept |= {"torque": self.design.spectrum(OptimizeSection("optimize"))}
+        kept |= {"objective": settings.quantity(_LASTING)}
+        options = {"method": METHODS[_DEFAULT_METHOD](**_OVER_LIFE), "positions": None}
+        return dataclasses.replace(self, method=_DEFAULT_METHOD, problem=kept, options=options)
 
     def __call__(self, mesh: Mesh, callback: Callback | None = None) -> Optimum | Front:
         """Runs it on a prepared mesh."""
-        design = self.design
-        if self.method == "free_form":
-            return free_form(mesh, callback=callback, **self.options)
-        if self.method == "te_iteration":
-            return self._iterate(mesh, callback)
-        if self.method == PARETO:
-            return pareto(design.design, design.bounds, mesh=mesh, callback=callback, **self.options)
-        return minimize(design.design, design.bounds, mesh=mesh, callback=callback, **self.options)
-
-    def _iterate(self, mesh: Mesh, callback: Callback | None) -> Optimum:
-        design, options = self.design, {"callback": callback, **self.options}
-        start, torque = options.pop("start"), design.torque
-        if start == "low_pressure":
-            return iterate_from_low_pressure(design.design, design.bounds, mesh=mesh, torque=torque, **options)
-        pinion, wheel = design.design({}) if start == "given" else (None, None)
-        return iterate_transmission_error(mesh, torque, pinion=pinion, wheel=wheel, **options)
+        search = pareto if self.method == PARETO else minimize
+        return search(Problem(mesh, **self.problem), callback=callback, **self.options)
 
 
 def _arguments(
     design: DesignFile, section: OptimizeSection, name: str, *, of_the_file: bool, quick: bool
-) -> tuple[dict[str, Any], str | None]:
-    """Arguments of the function of a method, and the curve of flanks without parameters."""
+) -> tuple[dict[str, Any], dict[str, Any], str | None]:
+    """Arguments of the problem and of its search, and the curve of flanks without parameters."""
     flanks_alone = name in METHODS_WITHOUT_VARIABLES
     check_known("optimize.method", name, known_methods())
     if not design.bounds and not flanks_alone:
@@ -368,38 +354,39 @@ def _arguments(
     options = _options_of(section, name, of_the_file=of_the_file)
     _check_options(design, name, options)
     curve = options.pop("curve", CURVE) if flanks_alone else None
-    common = _common(design, section, name, quick)
-    fewer = _QUICK.get(name, {}) if quick else {}
+    problem = {"torque": design.spectrum(section), **_goals(design, section, name, quick)}
+    varies = name != "free_form"
     if name == "te_iteration":
-        _check_iteration(design, options["start"], section)
-        if options["start"] == "low_pressure":
-            options["method"] = METHODS[_DEFAULT_METHOD](**(_QUICK[_DEFAULT_METHOD] if quick else {}))
-        common = options
-    elif name == "free_form":
-        common |= options | fewer
-    else:
-        common["method"] = _made_by(name)(**options | fewer)
-    if name in METHODS:
-        common["rounding"] = _rounding(design, section)
+        start = options.get("start")
+        _check_iteration(design, start, section)
+        if start == "low_pressure":
+            options["search"] = METHODS[_DEFAULT_METHOD](**(_QUICK[_DEFAULT_METHOD] if quick else {}))
+        varies = start in ("given", "low_pressure")
+    if varies:
+        problem |= {"design": design.design, "bounds": design.bounds}
+    fewer = _QUICK.get(name, {}) if quick else {}
+    search: dict[str, Any] = {"method": _made_by(name)(**options | fewer)}
+    if _varies(name):
+        search["rounding"] = _rounding(design, section)
     elif of_the_file:
         section.refuse(["rounding"], f' with method "{name}"')
     if quick:  # a quick look stays on its mesh
-        common["positions"] = None
-    return common, curve
+        search["positions"] = None
+    return problem, search, curve
 
 
-def _common(design: DesignFile, section: OptimizeSection, name: str, quick: bool) -> dict[str, Any]:
-    """Objective, cases and constraints."""
+def _goals(design: DesignFile, section: OptimizeSection, name: str, quick: bool) -> dict[str, Any]:
+    """Objective, measure, constraints and manufactured gears."""
     found: dict[str, Any] = {
-        **_objective(design, section, name),
-        "torque": design.spectrum(section),
+        "objective": _objective(design, section, name),
         "measure": _measure(section),
         "constraints": _constraints(design, section),
-        "seed": section.seed or 0,
     }
     if section.manufactured is not None:
-        found["tolerance"] = tolerance_of(design)
-        found["samples"] = min(section.manufactured, _QUICK_GEARS) if quick else section.manufactured
+        pairs = min(section.manufactured, _QUICK_GEARS) if quick else section.manufactured
+        tolerance = tolerance_of(design)
+        assert tolerance is not None  # by `check`
+        found["manufactured"] = ManufacturedGears(tolerance, pairs, section.seed or 0)
     return found
 
 
@@ -411,17 +398,15 @@ def _objectives(
     return tuple(quantity_named(design, "optimize.objective", each) for each in named)
 
 
-def _objective(design: DesignFile, section: OptimizeSection, name: str) -> dict[str, Any]:
-    """Keyword arguments of a method for its objective; empty for a method with a fixed objective."""
+def _objective(design: DesignFile, section: OptimizeSection, name: str) -> str | Quantity | tuple[str | Quantity, ...]:
+    """The objective of a method, or several."""
     objectives = _objectives(design, section, _FRONT if name == PARETO else ("ppte",))
     if (len(objectives) > 1) != (name == PARETO):
         problem = f'{len(objectives)} with method "{name}": method "pareto" takes several, the others take one'
         raise DesignFileError("optimize.objective", problem)
-    if name in METHODS_WITHOUT_VARIABLES:
-        if objectives != ("ppte",):
-            raise DesignFileError("optimize.objective", f'must be "ppte" with method "{name}"')
-        return {}
-    return {"objectives": objectives} if name == PARETO else {"objective": objectives[0]}
+    if name in METHODS_WITHOUT_VARIABLES and objectives != ("ppte",):
+        raise DesignFileError("optimize.objective", f'must be "ppte" with method "{name}"')
+    return objectives if name == PARETO else objectives[0]
 
 
 def _measure(section: OptimizeSection) -> AbstractMeasure:
@@ -447,7 +432,7 @@ def _constraint(design: DesignFile, section: ConstraintSection) -> Constraint:
     if isinstance(of, str):
         of = quantity_named(design, f"{key}.of", of)
         _check_reachable(design, f"{key}.low", of, section.low)
-        unit = quantity_of(of, key).unit
+        unit = quantity_of(of).unit
     else:
         for name in of:
             if name not in design.bounds:
@@ -474,7 +459,7 @@ def _rounding(design: DesignFile, section: OptimizeSection) -> dict[str, float]:
         if name not in design.bounds:
             problem = f'"{name}" is not a variable, {suggestion(name, design.bounds)}'
             raise DesignFileError(f"{asked.key}.variables", problem)
-    return refused(asked.key, check_steps, "optimize", {**steps, **(asked.variables or {})}, design.bounds)
+    return refused(asked.key, check_steps, {**steps, **(asked.variables or {})}, design.bounds)
 
 
 def _check_reachable(design: DesignFile, key: str, of: str | Quantity, low: float | None) -> None:
@@ -488,7 +473,7 @@ def _check_reachable(design: DesignFile, key: str, of: str | Quantity, low: floa
         raise DesignFileError(key, f"{low:g} must be at most {most}: wear.revolutions = {looked_at:g}")
 
 
-def _check_iteration(design: DesignFile, start: str, section: OptimizeSection) -> None:
+def _check_iteration(design: DesignFile, start: str | None, section: OptimizeSection) -> None:
     """The iteration levels the transmission error at the design torque and knows nothing else."""
     keys = ("measure", "level", "torques", "weights", "manufactured", "constraint")
     section.refuse(keys, ' with method "te_iteration"')

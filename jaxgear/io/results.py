@@ -105,7 +105,7 @@ def write_wheel_points(
     """
     if wheel is not None:
         deepest = max(float(np.max(profile.y)) for _, _, profile in _sides(left, right))
-        check("write_wheel_points", "radius of wheel", wheel.radius, "mm", low=deepest, open_low=True)
+        check("radius of wheel", wheel.radius, "mm", low=deepest, open_low=True)
     columns = _WHEEL_COLUMNS if wheel is None else (*_WHEEL_COLUMNS, "wheel_radius_mm")
     with writing(path), Path(path).open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)

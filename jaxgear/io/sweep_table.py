@@ -15,7 +15,7 @@ from .named_quantities import quantity_named
 from .rows import read_variants
 from .table_keys import entry
 from .tables import FurtherTable
-from .tolerance_table import tolerance_of
+from .tolerance_table import manufactured_of
 from .value_types import LEVEL, SEED, WEIGHTS, choice, count, either, list_of, positive, real, table, text
 
 # The keys that a kind of sampling takes, the first of which it needs; what another kind takes has no effect and is
@@ -78,14 +78,12 @@ class SweepSection(FurtherTable):
     def arguments(self, design: DesignFile) -> dict[str, Any]:
         """Arguments of `jaxgear.sweep` besides design and mesh, and the highest torque of all variants [N m]."""
         results, (load, highest) = self.quantities(design), self.load(design)
-        tolerance = design.tables.get("tolerance")
         return {
             "plan": self.plan(design),
-            "torque": load,
+            "load": load,
             "highest_torque": highest,
             "results": results,
-            "tolerance": tolerance_of(design),
-            **({} if tolerance is None else {"samples": tolerance.samples, "seed": tolerance.seed}),
+            "manufactured": manufactured_of(design),
             **({} if self.part_rows is None else {"part_rows": self.part_rows}),
             "title": design.title,
             "units": design.units,

@@ -1,6 +1,6 @@
 """The table [tolerance], and the flank tolerances of the gears of a design file."""
 
-from ..tolerance import Tolerance, ToleranceClass
+from ..tolerance import ManufacturedGears, Tolerance, ToleranceClass
 from .design_file import DesignFile
 from .errors import DesignFileError, problem, refused
 from .table_keys import entry, section_of
@@ -42,6 +42,15 @@ def _class_of(design: DesignFile, name: str, quality: int) -> ToleranceClass:
         field, _, text = problem(error).partition(" = ")
         key, text = (f"{name}.{field}", text) if hasattr(gear, field) else (name, problem(error))
         raise DesignFileError(key, f"{text} for tolerances of ISO 1328-1") from None
+
+
+def manufactured_of(design: DesignFile, most: int | None = None) -> ManufacturedGears | None:
+    """The manufactured gears of the table [tolerance] if there is one, at most so many pairs."""
+    tolerance = tolerance_of(design)
+    if tolerance is None:
+        return None
+    section = design.tables["tolerance"]
+    return ManufacturedGears(tolerance, min(section.samples, most or section.samples), section.seed)
 
 
 def tolerance_of(design: DesignFile) -> Tolerance | None:

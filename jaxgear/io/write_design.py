@@ -71,9 +71,9 @@ def write_starter(
         raise ValueError(f"{path}: the name of a design file must end in .toml")
     if path.exists() or path.is_symlink():
         raise ValueError(f"{path}: exists already, choose another name")
-    check("new", "torque", torque, "N m", low=0.0, open_low=True)
+    check("torque", torque, "N m", low=0.0, open_low=True)
     if speed is not None:
-        check("new", "speed", speed, "rpm", low=0.0, open_low=True)
+        check("speed", speed, "rpm", low=0.0, open_low=True)
     compile_quickly()
     pair = starter_pair(teeth, module, face_width, helix_angle, pressure_angle, profile_shift)
     rule = iso_relief(pair, torque)
@@ -165,7 +165,7 @@ def write_design(
     Raises:
         ValueError: for a torque that is not positive, or where the file cannot be written.
     """
-    check("write_design", "torque", torque, "N m", low=0.0, open_low=True)
+    check("torque", torque, "N m", low=0.0, open_low=True)
     lines = [f"title = {_text(printable(title))}", ""] if title else []
     for name, quality in zip(("pinion", "wheel"), quality_classes or (None, None)):
         classes = [] if quality is None else [f"quality_class = {quality}  # ISO 1328-1"]

@@ -6,7 +6,7 @@ layout_flank_lines           both together
 vary_profiles                3: profile modifications in all combinations
 flank_line_contact           the loaded tooth contact of the flank lines alone
 damage                       pitting and bending under a duty cycle, as a differentiable number
-findings_of                 what of a layout is not usual
+layout_findings              values of a layout out of the usual range
 gear_lives                   life of either gear by the face load factors of a contact
 lives_in_cases               what is left of the life in the five cases
 face_load_over_torques       K_Hbeta over the torque
@@ -17,7 +17,7 @@ References:
     U. Kissling's three-step layout of modifications.
 """
 
-from .findings import findings_of as findings_of
+from .findings import layout_findings as layout_findings
 from .flank_line import FlankLine as FlankLine
 from .flank_line import Stations as Stations
 from .flank_line import at_stations as at_stations

@@ -75,7 +75,7 @@ ContactCases = Mapping[str, Mapping[str, np.ndarray]]
 _Factors = dict[str, list[Any]]  # of every step, by the deviations
 
 
-def findings_of(
+def layout_findings(
     layout: FlankLineLayout,
     support: AbstractSupport,
     *,

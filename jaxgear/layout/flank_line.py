@@ -109,11 +109,11 @@ def at_torque(support: ShaftSupport, torque: Given) -> ShaftSupport:
         ValueError: for a negative torque, and for a gearbox whose mesh carries none, which nothing can be in proportion
             to.
     """
-    check("at_torque", "torque", torque, "N m", low=0.0)
+    check("torque", torque, "N m", low=0.0)
     now = support.torque
     known = concrete(now)
     if known is not None and known <= 0:
-        raise ValueError("at_torque: the couplings transmit no torque to the mesh, which could be scaled")
+        raise ValueError("the couplings transmit no torque to the mesh, which could be scaled")
     factor = real(torque) / now
     given = [
         (i, j)
@@ -144,14 +144,14 @@ def at_stations(support: AbstractSupport, torque: Given | None = None, *, statio
         _check_load(support, torque)
         if stations not in (None, support.count):
             raise ValueError(
-                f"at_stations: stations = {stations} must be {support.count}, which were worked out; give the support "
+                f"stations = {stations} must be {support.count}, which were worked out; give the support "
                 "itself for others"
             )
         return support
     if not isinstance(support, ShaftSupport) and torque is None:
-        raise ValueError("at_stations: torque must be given: no coupling has one")
-    check("at_stations", "torque", torque, "N m", low=0.0)
-    count = whole("at_stations", "stations", STATIONS if stations is None else stations, 2, 1001)
+        raise ValueError("torque must be given: no coupling has one")
+    check("torque", torque, "N m", low=0.0)
+    count = whole("stations", STATIONS if stations is None else stations, 2, 1001)
     return _at_stations(support, optional_real(torque), count)
 
 
@@ -161,7 +161,7 @@ def _check_load(face: Stations, torque) -> None:
     given, known = concrete(real(torque)), concrete(face.load)
     if given is None or known is None or not np.isclose(given, known, rtol=_SAME_TORQUE):
         raise ValueError(
-            "at_stations: torque must be that under which the stations were worked out: other meshes and loads open "
+            "torque must be that under which the stations were worked out: other meshes and loads open "
             "other gaps at another one, give the support itself"
         )
 

@@ -107,7 +107,7 @@ def damage(
     Raises:
         ValueError: for a duration without speeds, and a strength without an S-N curve.
     """
-    whole("damage", "stations", stations, 3, 1001)
+    whole("stations", stations, 3, 1001)
     found = under_loads(support, load.torques, stations)
     return damage_of(found, load, strength, pinion or FlankLine(), wheel or FlankLine())
 
@@ -187,7 +187,7 @@ def summed(pair: GearPair, found: Loaded, load: LoadSpectrum, strength: Strength
     mean = largest / factor
     # K_Fbeta of an even load; below 1 is rounding
     bent = mean * root_face_load_factor(jnp.maximum(factor, 1.0), pair.face_width, tooth_height(pair))
-    turns = load.turns("damage")
+    turns = load.turns()
     cycles = turns, turns / pair.gear_ratio
     loaded = largest != 0
     # the root has no derivative at zero load
@@ -195,7 +195,7 @@ def summed(pair: GearPair, found: Loaded, load: LoadSpectrum, strength: Strength
     bending = [bent * share for share in root]
 
     def of(name: Mode, stresses) -> OfGears:
-        shares = damage_per_cycle("damage", strength, name, tuple(stresses))
+        shares = damage_per_cycle(strength, name, tuple(stresses))
         # a load that is never run does nothing, even where it has not been found
         return jnp.stack([jnp.where(run > 0, run * each, 0.0) for run, each in zip(cycles, shares)])
 
@@ -246,15 +246,15 @@ def longest_life(
             load over the face is not found.
     """
     if any(concrete(leaf) is None for leaf in jax.tree.leaves((support, load, strength))):
-        raise ValueError("longest_life: searches with numbers, not inside of a traced function; `damage` can be traced")
+        raise ValueError("longest_life searches with numbers, not inside of a traced function; `damage` can be traced")
     if not float(jnp.max(jnp.where(load.weights > 0, load.torques, 0.0))) > 0:
-        raise ValueError("longest_life: torques are all zero; every flank line has an infinite life")
+        raise ValueError("torques are all zero; every flank line has an infinite life")
     faces = under_loads(support, load.torques, stations)
     unmodified = damage(support, load, strength, stations=stations)
     missed = np.asarray(load.torques)[~np.asarray(unmodified.converged)]
     if len(missed):
         raise ValueError(
-            f"longest_life: the load over the face at {float(missed[0]):g} N m did not converge, "
+            f"the load over the face at {float(missed[0]):g} N m did not converge, "
             f"{reason(unmodified.status)}: do the loads leave a shaft loose in its clearances?"
         )
     worst = int(np.argmax(np.sum(unmodified.pitting, axis=0)))
@@ -321,7 +321,7 @@ def face_load_over_torques(
     Raises:
         ValueError: for torques that are negative or repeated, and other numbers out of range.
     """
-    whole("face_load_over_torques", "stations", stations, 2, 1001)
+    whole("stations", stations, 2, 1001)
     faces = under_loads(support, LoadSpectrum(torques).torques, stations)
     return _factors(faces, pinion or FlankLine(), wheel or FlankLine())
 

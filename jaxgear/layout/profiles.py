@@ -165,10 +165,10 @@ def vary_profiles(
             lengths that are not positive or none, and where every variant failed.
     """
     if kind not in ("tip_relief", "profile_crowning"):
-        raise ValueError(f'vary_profiles: kind = {kind!r} must be "tip_relief" or "profile_crowning"')
+        raise ValueError(f'kind = {kind!r} must be "tip_relief" or "profile_crowning"')
     for name, value in (("length", length), ("curve", curve)):
         if kind == "profile_crowning" and value is not None:
-            raise ValueError(f"vary_profiles: {name} has no effect on a profile crowning")
+            raise ValueError(f"{name} has no effect on a profile crowning")
     crossed = {
         "pinion_amounts": pinion_amounts,
         "wheel_amounts": wheel_amounts,
@@ -176,17 +176,17 @@ def vary_profiles(
         "crownings": crownings,
     }
     for name, amounts in crossed.items():
-        check("vary_profiles", name, np.asarray(amounts, float), "um", low=0.0 if name.endswith("amounts") else None)
+        check(name, np.asarray(amounts, float), "um", low=0.0 if name.endswith("amounts") else None)
         if not len(amounts):
-            raise ValueError(f"vary_profiles: {name} must not be empty")
+            raise ValueError(f"{name} must not be empty")
     lengths = _lengths(mesh.pair, kind, length)
     design = _Crossed(flank_lines, kind, curve, mesh.pair)
     rows = [(*(0.0,) * len(crossed), *lengths[:1]), *itertools.product(*crossed.values(), *[lengths] * bool(lengths))]
     own = _results(mesh.pair)
     wanted = (*own, *(one for one in results if one not in own))
     plan, units = _plan(rows)
-    given: dict[str, Any] = {"mesh": mesh, "torque": torque, "results": wanted, "units": units}
-    table = sweep(design, plan, output=output, callback=callback, title="profile modifications", **given)
+    options: dict[str, Any] = {"results": wanted, "units": units, "output": output, "callback": callback}
+    table = sweep(mesh, torque, design, plan, title="profile modifications", **options)
     theoretical = float(path_of_contact(mesh.pair).contact_ratio + mesh.pair.overlap_ratio)
     if mesh.pair.is_spur:
         shock = table.column("effective_contact_ratio") - theoretical
@@ -226,7 +226,7 @@ def flank_line_contact(
     lengths = _lengths(mesh.pair, kind, None)
     plan, units = _plan([(0.0, 0.0, float(slope), 0.0, *lengths) for slope in deviations])
     design = _Crossed(flank_lines, kind, None, mesh.pair)
-    table = sweep(design, plan, mesh=mesh, torque=torque, results=_results(mesh.pair), units=units)
+    table = sweep(mesh, torque, design, plan, results=_results(mesh.pair), units=units)
     return {name: table.column(name) for name in table.results}
 
 
@@ -235,9 +235,9 @@ def _lengths(pair: GearPair, kind: Kind, given: float | Sequence[float] | None) 
     if kind == "profile_crowning":
         return ()
     lengths = np.atleast_1d(np.asarray(long_relief_length(pair) if given is None else given, float))
-    check("vary_profiles", "length", lengths, "mm", low=0.0, open_low=True)
+    check("length", lengths, "mm", low=0.0, open_low=True)
     if not len(lengths):
-        raise ValueError("vary_profiles: length must not be empty")
+        raise ValueError("length must not be empty")
     return tuple(map(float, lengths))
 
 
@@ -270,6 +270,6 @@ class _Crossed(eqx.Module):
 def _best(ppte: Float[np.ndarray, " variants"], shock: Float[np.ndarray, " variants"]) -> int:
     """The least transmission error without contact shock; with the least shock where all have some."""
     if not np.isfinite(ppte).any():
-        raise ValueError("vary_profiles: the contact of every variant failed")
+        raise ValueError("the contact of every variant failed")
     free = shock <= _SHOCK
     return int(np.nanargmin(np.where(free, ppte, np.nan) if free.any() else shock))

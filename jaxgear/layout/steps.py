@@ -171,16 +171,16 @@ def layout_flank_lines(
             where the load over the face is not found, and where no crowning keeps it off the edges.
     """
     if gear not in ("pinion", "wheel"):
-        raise ValueError(f'layout_flank_lines: gear = {gear!r} must be "pinion" or "wheel"')
+        raise ValueError(f'gear = {gear!r} must be "pinion" or "wheel"')
     if (duty_cycle is None) != (strength is None):
         given, missing = ("duty_cycle", "strength") if strength is None else ("strength", "duty_cycle")
-        raise ValueError(f"layout_flank_lines: {given} has no effect without {missing}")
-    check("layout_flank_lines", "further", further, "um", low=0.0)
+        raise ValueError(f"{given} has no effect without {missing}")
+    check("further", further, "um", low=0.0)
     if torque is None and duty_cycle is not None:
         torque = jnp.max(jnp.where(duty_cycle.weights > 0, duty_cycle.torques, 0.0))
     several = tolerances if isinstance(tolerances, Mapping) else {"tolerance": tolerances}
     if not several:
-        raise ValueError("layout_flank_lines: tolerances must not be empty")
+        raise ValueError("tolerances must not be empty")
     face = at_stations(support, torque, stations=stations)
     if duty_cycle is None or strength is None:
         line = level_load(face, negative_crowning=negative_crowning)
@@ -189,12 +189,9 @@ def layout_flank_lines(
     each = [crowning_off_the_edges(face, one, line=line, share=share) for one in several.values()]
     needed = jnp.max(jnp.stack(each))
     if not bool(jnp.isfinite(line.slope)):
-        raise ValueError(
-            "layout_flank_lines: the load over the face did not converge: do the loads leave a shaft loose in its "
-            "clearances?"
-        )
+        raise ValueError("the load over the face did not converge: do the loads leave a shaft loose in its clearances?")
     if not bool(jnp.isfinite(needed)):
-        raise ValueError("layout_flank_lines: no crowning keeps the load off the edges: the shafts are too soft")
+        raise ValueError("no crowning keeps the load off the edges: the shafts are too soft")
     added = _further(needed, further)
     on_wheel, crowned = (each.on(face.pair, "wheel") for each in (line, line.crowned(jnp.sum(added))))
     steps = FlankLine(), on_wheel, crowned

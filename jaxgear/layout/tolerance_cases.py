@@ -79,10 +79,10 @@ def flank_line_tolerance(
             span that is shorter than the face, or another kind.
     """
     if kind not in ("maximum", "statistical"):
-        raise ValueError(f'flank_line_tolerance: kind = {kind!r} must be "maximum" or "statistical"')
+        raise ValueError(f'kind = {kind!r} must be "maximum" or "statistical"')
     classes = quality_class if isinstance(quality_class, tuple | list) else (quality_class, quality_class)
     if len(classes) != 2:
-        raise ValueError(f"flank_line_tolerance: quality_class has {len(classes)} entries, must be one or two")
+        raise ValueError(f"quality_class has {len(classes)} entries, must be one or two")
     gears = pair.pinion, pair.wheel
     limits = [ToleranceClass.of(gear, each) for gear, each in zip(gears, classes)]
     slopes = [limit.helix_slope * pair.face_width / gear.face_width for limit, gear in zip(limits, gears)]
@@ -98,15 +98,15 @@ def _over_face(pair: GearPair, axes) -> list[Scalar]:
     if axes is None:
         return [jnp.zeros(())]
     if not isinstance(axes, Misalignment):
-        raise ValueError(f'flank_line_tolerance: axes = {axes!r} must be a Misalignment, "class" or None')
+        raise ValueError(f'axes = {axes!r} must be a Misalignment, "class" or None')
     for name in ("skew", "inclination", "direct"):
-        check("flank_line_tolerance", name, getattr(axes, name), "um", low=0.0)
+        check(name, getattr(axes, name), "um", low=0.0)
     if axes.bearing_span is None:
         return [axes.direct]
     span, width = concrete(axes.bearing_span), concrete(pair.face_width)
     if span is not None and width is not None and span < width:
         problem = f"bearing_span = {float(span):g} mm must be at least the face width, {float(width):g} mm"
-        raise ValueError(f"flank_line_tolerance: {problem}")
+        raise ValueError(f"{problem}")
     angle, share = pair.working_pressure_angle, pair.face_width / axes.bearing_span
     return [axes.direct, share * axes.skew * jnp.cos(angle), share * axes.inclination * jnp.sin(angle)]
 
@@ -225,7 +225,7 @@ def crowning_off_the_edges(
         the crowning, 0 where none is needed; NaN where 16 times the sum of all deviations and of the opening by bent
         shafts are not enough, or the load has not been found. Differentiable.
     """
-    check("crowning_off_the_edges", "share", share, "", low=0.0, high=1.0, open_low=True)
+    check("share", share, "", low=0.0, high=1.0, open_low=True)
     face = at_stations(support, torque, stations=stations)
     return _off_the_edges(face, tolerance, line or FlankLine(), real(share), stiffness)
 
@@ -252,9 +252,7 @@ def _off_the_edges(face: Stations, tolerance: FlankLineTolerance, line: FlankLin
 def _excess(line_load: Float[Array, "... slices"], share) -> Float[Array, "..."]:
     """Larger load of both ends less a share of the largest in between, over the mean."""
     if line_load.shape[-1] < 3:
-        raise ValueError(
-            f"tolerance_cases: {line_load.shape[-1]} stations must be at least 3, two of them are the edges"
-        )
+        raise ValueError(f"{line_load.shape[-1]} stations must be at least 3, two of them are the edges")
     ends = jnp.maximum(line_load[..., 0], line_load[..., -1])
     inner, mean = maximum(line_load[..., 1:-1], axis=-1), jnp.mean(line_load, axis=-1)
     return (ends - share * inner) / jnp.where(mean > 0, mean, 1.0)
@@ -279,7 +277,7 @@ def lives_in_cases(
     Raises:
         ValueError: as `damage` does.
     """
-    whole("lives_in_cases", "stations", stations, 3, 1001)
+    whole("stations", stations, 3, 1001)
     faces = under_loads(support, load.torques, stations)
     return _lives(faces, load, strength, tolerance, pinion or FlankLine(), wheel or FlankLine())
 

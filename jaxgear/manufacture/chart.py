@@ -135,10 +135,10 @@ def profile_trace(
     Raises:
         ValueError: for less than 2 points, a face coordinate that is not finite, or a roll length that is negative.
     """
-    check("profile_trace", "face_coordinate", face_coordinate, "mm")
-    check("profile_trace", "roll_length", roll_length, "mm", low=0.0)
+    check("face_coordinate", face_coordinate, "mm")
+    check("roll_length", roll_length, "mm", low=0.0)
     if roll_length is None:
-        whole("profile_trace", "points", points, 2)
+        whole("points", points, 2)
         roll_length = jnp.linspace(side.start_roll_length, side.tip_roll_length, points)
     dtype = side.start_roll_length.dtype
     return _profile(side, modification, tolerance, jnp.asarray(face_coordinate, dtype), jnp.asarray(roll_length, dtype))
@@ -167,10 +167,10 @@ def helix_trace(
         ValueError: for less than 2 points, or a roll length that is negative.
     """
     dtype = side.start_roll_length.dtype
-    check("helix_trace", "roll_length", roll_length, "mm", low=0.0)
+    check("roll_length", roll_length, "mm", low=0.0)
     roll = side.pitch_roll_length if roll_length is None else jnp.asarray(roll_length, dtype)
     if face_coordinate is None:
-        whole("helix_trace", "points", points, 2)
+        whole("points", points, 2)
         face_coordinate = jnp.linspace(-0.5, 0.5, points, dtype=dtype) * side.face_width
     return _helix(side, modification, tolerance, roll, jnp.asarray(face_coordinate, dtype))
 
@@ -224,7 +224,7 @@ def flank_deviations(side: Side, design: Trace, measured: Trace) -> FlankDeviati
     """
     if design.kind != measured.kind or design.design.shape != measured.design.shape:
         raise ValueError(
-            f"flank_deviations: measured is a {measured.kind} trace of {measured.design.shape[0]} points, must be a "
+            f"measured is a {measured.kind} trace of {measured.design.shape[0]} points, must be a "
             f"{design.kind} trace of {design.design.shape[0]} points like the design"
         )
     place = design.roll_length if design.kind == "profile" else design.face_coordinate
@@ -232,9 +232,9 @@ def flank_deviations(side: Side, design: Trace, measured: Trace) -> FlankDeviati
     low, high = profile_range(side) if design.kind == "profile" else helix_range(side)
     apart, inside = concrete(jnp.max(jnp.abs(place - other))), concrete(jnp.sum(_between(place, low, high)))
     if apart is not None and not apart <= _SAME_PLACE:
-        raise ValueError(f"flank_deviations: measured is {apart:.3g} mm off the places of the design, must be at them")
+        raise ValueError(f"measured is {apart:.3g} mm off the places of the design, must be at them")
     if inside is not None and inside < 2:
-        raise ValueError(f"flank_deviations: {inside} points lie in the evaluation range, must be at least 2")
+        raise ValueError(f"{inside} points lie in the evaluation range, must be at least 2")
     end = side.tip_roll_length if design.kind == "profile" else high
     return _deviations(place, measured.design - design.design, low, high, end)
 

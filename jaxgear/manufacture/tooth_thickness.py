@@ -55,9 +55,9 @@ def span(gear: Gear, teeth: int) -> Scalar:
             a face of a helical gear that is too narrow.
     """
     most = concrete(gear.teeth)
-    whole("span", "teeth", teeth, 1, float("inf") if most is None else float(most))
+    whole("teeth", teeth, 1, float("inf") if most is None else float(most))
     found = _span(gear, teeth)
-    _check_touched("span", "teeth", teeth, "", _half_span(gear, found), gear)
+    _check_touched("teeth", teeth, "", _half_span(gear, found), gear)
     across, width = concrete(_across(gear, found)), concrete(gear.face_width)
     if across is not None and width is not None and across > width:
         taken = f"takes {float(across):.4g} mm of the face, must take at most {float(width):.4g} mm, the face width"
@@ -101,10 +101,10 @@ def over_balls(gear: Gear, ball: Given) -> Scalar:
     Raises:
         ValueError: for a ball that falls onto the root circle, does not stand out of the spaces or misses the involute.
     """
-    check("over_balls", "ball", ball, "mm", low=0.0, open_low=True)
+    check("ball", ball, "mm", low=0.0, open_low=True)
     wanted, radius, touched = _ball(gear, ball)
     _check_ball(gear, ball, wanted, radius)
-    _check_touched("over_balls", "ball", ball, " mm", touched, gear)
+    _check_touched("ball", ball, " mm", touched, gear)
     return 2 * radius * _offset(gear) + ball
 
 
@@ -169,7 +169,7 @@ def allowance_of_span(gear: Gear, teeth: int, measured: Numbers) -> Float[Array,
     alpha = jnp.deg2rad(gear.pressure_angle)
     nominal = span(gear, teeth) - 1e-3 * gear.mean_tooth_thickness_allowance * jnp.cos(alpha)
     measured = real(measured)
-    _check_near("allowance_of_span", "measured", measured, nominal, gear)
+    _check_near("measured", measured, nominal, gear)
     return 1e3 * (measured - nominal) / jnp.cos(alpha)
 
 
@@ -185,17 +185,17 @@ def allowance_of_balls(gear: Gear, ball: Given, measured: Numbers) -> Float[Arra
         ValueError: for a dimension that puts the balls inside the base circle, or makes the tooth thicker or thinner by
             more than a base pitch.
     """
-    check("allowance_of_balls", "ball", ball, "mm", low=0.0, open_low=True)
+    check("ball", ball, "mm", low=0.0, open_low=True)
     measured = real(measured)
     ratio = (measured - ball) / (2 * gear.base_radius * _offset(gear))
     least = concrete(2 * gear.base_radius * _offset(gear) + ball)
-    check("allowance_of_balls", "measured", measured, "mm", low=None if least is None else float(least), open_low=True)
+    check("measured", measured, "mm", low=None if least is None else float(least), open_low=True)
     tangent = jnp.sqrt(ratio**2 - 1)
     thicker = gear.module * gear.teeth * (involute(tangent) - _thick(gear, ball, 0.0))
     found, pitch = concrete(thicker), concrete(gear.base_pitch)
     if found is not None and pitch is not None and np.abs(found).max() > float(pitch):
         worst = np.argmax(np.abs(found))
-        given = f"allowance_of_balls: measured = {float(np.ravel(measured)[worst]):g} mm"
+        given = f"measured = {float(np.ravel(measured)[worst]):g} mm"
         thicker_by = float(np.ravel(found)[worst])
         raise ValueError(f"{given} makes the tooth {thicker_by:.3g} mm thicker, must be within {float(pitch):.3g} mm")
     return 1e3 * thicker
@@ -224,12 +224,12 @@ def _check_ball(gear: Gear, ball: Given, wanted: Scalar, radius: Scalar) -> None
         return
     size, room, centre, root, tip = (float(value) for value in known if value is not None)
     if room <= 0 or centre - size / 2 < root:
-        raise ValueError(f"over_balls: ball = {size:g} mm touches no flanks above the root circle, must be larger")
+        raise ValueError(f"ball = {size:g} mm touches no flanks above the root circle, must be larger")
     if centre + size / 2 < tip:
-        raise ValueError(f"over_balls: ball = {size:g} mm does not protrude beyond the tip circle, must be larger")
+        raise ValueError(f"ball = {size:g} mm does not protrude beyond the tip circle, must be larger")
 
 
-def _check_touched(owner: str, name: str, value: Given, unit: str, touched: Scalar, gear: Gear) -> None:
+def _check_touched(name: str, value: Given, unit: str, touched: Scalar, gear: Gear) -> None:
     """Refuses anvils or balls that would touch at a roll length [mm] where there is no involute."""
     known = [concrete(each) for each in (touched, outline(gear).form_roll_length, gear.tip_roll_length)]
     if any(each is None for each in known):
@@ -237,13 +237,13 @@ def _check_touched(owner: str, name: str, value: Given, unit: str, touched: Scal
     at, form, tip = (float(each) for each in known if each is not None)
     if not form <= at <= tip:
         place = f"would touch the flank at a roll length of {at:.4g} mm"
-        raise ValueError(f"{owner}: {name} = {value:g}{unit} {place}, must be within {form:.4g} and {tip:.4g} mm")
+        raise ValueError(f"{name} = {value:g}{unit} {place}, must be within {form:.4g} and {tip:.4g} mm")
 
 
-def _check_near(owner: str, name: str, value: Array, nominal: Scalar, gear: Gear) -> None:
+def _check_near(name: str, value: Array, nominal: Scalar, gear: Gear) -> None:
     middle, pitch = concrete(nominal), concrete(gear.base_pitch)
     if middle is not None and pitch is not None:
-        check(owner, name, value, "mm", low=float(middle - pitch), high=float(middle + pitch))
+        check(name, value, "mm", low=float(middle - pitch), high=float(middle + pitch))
 
 
 def _check_spanned(gear: Gear, measured: Array, teeth: Given) -> None:
@@ -355,7 +355,7 @@ def _named(name: str, found: Callable[[], Any], **beside: Any) -> Any:
         return found()
     except ValueError as error:
         shown = [f"with {key} = {value:g}" for key, value in beside.items() if concrete(value) is not None]
-        text = ", ".join([str(error).partition(": ")[2], *shown])
+        text = ", ".join([str(error), *shown])
         raise ValueError(f"ToothThickness: {name}: {text}") from error
 
 

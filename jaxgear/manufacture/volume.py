@@ -51,8 +51,8 @@ def reference_volumes(side: Side, amount: Given) -> ReferenceVolumes:
     Raises:
         ValueError: for a negative amount, or a contact ratio below 1.
     """
-    check("reference_volumes", "amount", amount, "um", low=0.0)
-    check("reference_volumes", "contact ratio", concrete(_contact_ratio(side)), "", low=1.0)
+    check("amount", amount, "um", low=0.0)
+    check("contact ratio", concrete(_contact_ratio(side)), "", low=1.0)
     return _reference_volumes(side, jnp.asarray(amount, side.start_roll_length.dtype))
 
 
@@ -79,7 +79,7 @@ def ground_volume(side: Side, modification: AbstractModification, *, stock: Give
     Raises:
         ValueError: for a negative stock.
     """
-    check("ground_volume", "stock", stock, "um", low=0.0)
+    check("stock", stock, "um", low=0.0)
     return gear_volume(side, modification) + 1e-3 * stock * ground_area(side)
 
 

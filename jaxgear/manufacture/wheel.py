@@ -59,7 +59,7 @@ def space_flank(
     Raises:
         ValueError: for less than 2 points.
     """
-    return _space_flank(side, modification, roll_length, whole("space_flank", "points", points, 2))
+    return _space_flank(side, modification, roll_length, whole("points", points, 2))
 
 
 @program
@@ -78,7 +78,7 @@ def space_point(
 ) -> tuple[Float[Array, "..."], ...]:
     """x, y [mm] and inclination [rad] of points of the flank with so much material removed [um]."""
     gear = side.gear
-    check_spur("a form wheel, which touches a helical flank in a curve of space", gear)
+    check_spur(gear)
     base = jnp.broadcast_to(gear.base_radius, roll_length.shape)
     angle = jnp.pi / gear.teeth + load_angle(gear, roll_length)
     left = roll_length - 1e-3 * removed
@@ -155,7 +155,7 @@ def wheel_profile(side: Side, modification: AbstractModification, *, points: int
     Raises:
         ValueError: for less than 2 points.
     """
-    whole("wheel_profile", "points", points, 2)
+    whole("points", points, 2)
     roll = jnp.linspace(outline(side.gear).form_roll_length, _end(side, modification), points)
     flank = space_flank(side, modification, roll)
     y = flank.y - side.gear.root_circle_radius
@@ -177,7 +177,7 @@ def smallest_wheel_radius(side: Side, flange_radius: Given) -> Scalar:
     Raises:
         ValueError: for a negative radius.
     """
-    check("smallest_wheel_radius", "flange_radius", flange_radius, "mm", low=0.0)
+    check("flange_radius", flange_radius, "mm", low=0.0)
     return _depth(side) + flange_radius
 
 
@@ -191,7 +191,7 @@ def run_out(side: Side, radius: Given) -> Scalar:
     """
     depth = _depth(side)
     known = concrete(depth)
-    check("run_out", "radius", radius, "mm", low=None if known is None else float(known), open_low=True)
+    check("radius", radius, "mm", low=None if known is None else float(known), open_low=True)
     return jnp.sqrt(depth * (2 * radius - depth))
 
 
@@ -203,7 +203,7 @@ def largest_wheel_radius(side: Side, gap: Given) -> Scalar:
     """
     depth = _depth(side)
     known = concrete(depth)
-    check("largest_wheel_radius", "gap", gap, "mm", low=None if known is None else float(known), open_low=True)
+    check("gap", gap, "mm", low=None if known is None else float(known), open_low=True)
     return (depth**2 + gap**2) / (2 * depth)
 
 

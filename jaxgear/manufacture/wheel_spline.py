@@ -96,7 +96,7 @@ def relief_start(side: Side, modification: AbstractModification, threshold: Give
     Raises:
         ValueError: for a negative threshold.
     """
-    check("relief_start", "threshold", threshold, "um", low=0.0)
+    check("threshold", threshold, "um", low=0.0)
     return _relief_start(side, modification, jnp.asarray(threshold, side.start_roll_length.dtype))
 
 
@@ -147,7 +147,7 @@ def wheel_spline(
     start, tip = concrete(side.start_roll_length), concrete(side.tip_roll_length)
     if start is not None and tip is not None:
         last = float(tip - _SHORTEST * (tip - start))
-        check("wheel_spline", "node", node, "mm", low=float(start) * (1 - _ROUNDING), high=last * (1 + _ROUNDING))
+        check("node", node, "mm", low=float(start) * (1 - _ROUNDING), high=last * (1 + _ROUNDING))
     node = None if node is None else jnp.asarray(node, side.start_roll_length.dtype)
     return _fitted(side, modification, node, degree, criterion, tangent)
 
@@ -191,9 +191,9 @@ def _largest_at(
 
 def _check(degree: int, criterion: str) -> None:
     if degree not in (2, 3):
-        raise ValueError(f"wheel_spline: degree = {degree!r} must be 2 or 3")
+        raise ValueError(f"degree = {degree!r} must be 2 or 3")
     if criterion not in ("least_squares", "minimax"):
-        raise ValueError(f'wheel_spline: criterion = {criterion!r} must be "least_squares" or "minimax"')
+        raise ValueError(f'criterion = {criterion!r} must be "least_squares" or "minimax"')
 
 
 def _relief_length(modification: AbstractModification) -> Scalar | None:

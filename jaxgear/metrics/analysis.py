@@ -55,20 +55,19 @@ class Analysis:
         """Modifications of pinion and wheel, by these names."""
         return {"pinion": self.cycle.pinion, "wheel": self.cycle.wheel}
 
-    def mesh_for(self, owner: str) -> Mesh:
+    @property
+    def prepared_mesh(self) -> Mesh:
         """The mesh, for a quantity that solves further on it.
-
-        Args:
-            owner: name of the quantity, for the message.
 
         Raises:
             ValueError: where there is none.
         """
         if self.mesh is None:
-            raise ValueError(f"{owner}: needs the prepared mesh besides the cycle, give it Analysis(cycle, mesh)")
+            raise ValueError("needs the prepared mesh besides the cycle, give it Analysis(cycle, mesh)")
         return self.mesh
 
-    def deviation(self, owner: str) -> Float[Array, "pairs slices positions"]:
+    @property
+    def deviation(self) -> Float[Array, "pairs slices positions"]:
         """Material that deviations have removed from the gears, besides their modifications [um].
 
         Of a cycle whose modifications are not known it is all that was removed.
@@ -76,7 +75,7 @@ class Analysis:
         Raises:
             ValueError: where there is no mesh.
         """
-        cycle, mesh = self.cycle, self.mesh_for(owner)
+        cycle, mesh = self.cycle, self.prepared_mesh
         removed = removed_material(mesh, cycle.torque, **self.flanks)
         deviation = cycle.gap - over_slices(mesh.corner_gap) - removed.amount
         if cycle.pinion is None or cycle.wheel is None:

@@ -136,7 +136,7 @@ def face_load_factors(cycle: MeshCycle) -> Curve:
     Raises:
         ValueError: for a cycle of one slice.
     """
-    return _at_positions("face_load_factors", cycle).factor
+    return _at_positions(cycle).factor
 
 
 @over_batch
@@ -152,7 +152,7 @@ def face_load_factor(cycle: MeshCycle) -> Scalar:
     Raises:
         ValueError: for a cycle of one slice.
     """
-    return _worst("face_load_factor", cycle).factor
+    return _worst(cycle).factor
 
 
 @over_batch
@@ -163,7 +163,7 @@ def mean_face_load_factor(cycle: MeshCycle) -> Scalar:
     Raises:
         ValueError: for a cycle of one slice.
     """
-    _check_slices("mean_face_load_factor", cycle)
+    _check_slices(cycle)
     return _over_cycle(cycle).factor
 
 
@@ -175,7 +175,7 @@ def root_face_load_factor(cycle: MeshCycle) -> Scalar:
         ValueError: for a cycle of one slice.
     """
     pair = cycle.kinematics.pair
-    factor = _worst("root_face_load_factor", cycle).factor
+    factor = _worst(cycle).factor
     return jnp.maximum(factor, 1.0) ** root_exponent(pair.face_width, tooth_height(pair))
 
 
@@ -189,7 +189,7 @@ def edge_load_factor(cycle: MeshCycle) -> Scalar:
     Raises:
         ValueError: for a cycle of one slice.
     """
-    face = _worst("edge_load_factor", cycle)
+    face = _worst(cycle)
     mean = jnp.sum(face.line_load * face.width) / jnp.sum(face.width)
     idle = mean <= 0
     ends = jnp.maximum(face.line_load[0], face.line_load[-1])
@@ -201,9 +201,9 @@ def over_several_slices(factor: Callable[[MeshCycle], Scalar], cycle: MeshCycle)
     return factor(cycle) if cycle.kinematics.resolution.slices > 1 else 1.0
 
 
-def _at_positions(owner: str, cycle: MeshCycle) -> _Face:
+def _at_positions(cycle: MeshCycle) -> _Face:
     """Load over the face of the pair with the largest line load, of helical gears of all; shape (positions, slices)."""
-    _check_slices(owner, cycle)
+    _check_slices(cycle)
     of, load = cycle.kinematics, jnp.moveaxis(cycle.line_load, 2, 0)  # positions, pairs, slices
     if of.helical:
         return _Face(jnp.sum(load, axis=1), of.slice_width)
@@ -211,17 +211,17 @@ def _at_positions(owner: str, cycle: MeshCycle) -> _Face:
     return _Face(jnp.take_along_axis(load, most, axis=1)[:, 0], of.slice_width)
 
 
-def _check_slices(owner: str, cycle: MeshCycle) -> None:
+def _check_slices(cycle: MeshCycle) -> None:
     if cycle.kinematics.resolution.slices == 1:
-        raise ValueError(f"{owner}: a mesh of 1 slice has no load over the face: prepare with Resolution(slices=11)")
+        raise ValueError("a mesh of 1 slice has no load over the face: prepare with Resolution(slices=11)")
 
 
-def _worst(owner: str, cycle: MeshCycle) -> _Face:
+def _worst(cycle: MeshCycle) -> _Face:
     """`_at_positions` where the line load is largest; of helical gears the mean over the cycle; shape (slices,)."""
     if cycle.kinematics.helical:
-        _check_slices(owner, cycle)
+        _check_slices(cycle)
         return _over_cycle(cycle)
-    found = _at_positions(owner, cycle)
+    found = _at_positions(cycle)
     worst = jnp.argmax(jnp.max(found.line_load, axis=1))
     return found._replace(line_load=found.line_load[worst])
 

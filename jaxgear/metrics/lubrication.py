@@ -44,8 +44,8 @@ def flash_temperature(
     References:
         ISO/TS 6336-20 (ISO/TR 13989-1); H. Blok 1937.
     """
-    check("flash_temperature", "speed", speed, "rpm", low=0.0)
-    check("flash_temperature", "friction", friction, "", low=0.0)
+    check("speed", speed, "rpm", low=0.0)
+    check("friction", friction, "", low=0.0)
     return _flash(cycle, real(speed), real(friction))
 
 
@@ -149,8 +149,8 @@ def friction_coefficient(cycle: MeshCycle, lubricant: Lubricant) -> Scalar:
     """
     if cycle.operating_point.friction is not None:
         return cycle.operating_point.friction
-    speed = _running("friction_coefficient", cycle)
-    check("friction_coefficient", "speed", speed, "rpm", low=0.0, open_low=True)
+    speed = _running(cycle)
+    check("speed", speed, "rpm", low=0.0, open_low=True)
     contact = cycle.kinematics.path_of_contact
     radius = _normal(cycle.kinematics.pair, contact.reduced_radius(0.0))
     rolling = sum(contact.rolling_speeds(0.0, speed))
@@ -195,8 +195,8 @@ def loss_power(cycle: MeshCycle, lubricant: Lubricant | None = None) -> Scalar:
     Raises:
         ValueError: for a cycle without a speed, and without both lubricant and coefficient.
     """
-    input_power = cycle.torque * _running("loss_power", cycle) * jnp.pi / 30
-    return input_power * _friction("loss_power", cycle, lubricant) * loss_factor(cycle)
+    input_power = cycle.torque * _running(cycle) * jnp.pi / 30
+    return input_power * _friction(cycle, lubricant) * loss_factor(cycle)
 
 
 @over_batch
@@ -205,13 +205,13 @@ def mesh_efficiency(cycle: MeshCycle, lubricant: Lubricant | None = None) -> Sca
 
     What seals, bearings and churned oil take is not in it.
     """
-    return 1 - _friction("mesh_efficiency", cycle, lubricant) * loss_factor(cycle)
+    return 1 - _friction(cycle, lubricant) * loss_factor(cycle)
 
 
 @over_batch
 def lubricated_flash_temperature(cycle: MeshCycle, lubricant: Lubricant) -> Load:
     """`flash_temperature` [K] with the coefficient of friction of a lubricant, at line loads times its load factor."""
-    speed = _running("flash_temperature", cycle)
+    speed = _running(cycle)
     rise = flash_temperature(cycle, speed, friction=friction_coefficient(cycle, lubricant))
     return rise * lubricant.load_factor**0.75  # heat over the square root of the contact width
 
@@ -254,7 +254,7 @@ def film_thickness(cycle: MeshCycle, lubricant: Lubricant) -> Load:
         D. Dowson, G. R. Higginson, Elasto-hydrodynamic Lubrication, 1966; ISO/TS 6336-22 (ISO/TR 15144-1), method A.
     """
     kinematics, (pinion, wheel) = cycle.kinematics, cycle.sides
-    speed = _running("film_thickness", cycle)
+    speed = _running(cycle)
     speeds = kinematics.path_of_contact.rolling_speeds(kinematics.contact_path, speed)
     rolling, pair = over_slices(speeds[0] + speeds[1]), kinematics.pair
     radius = over_slices(_normal(pair, reduced_radius(pinion.contact_roll_length, wheel.contact_roll_length)))
@@ -293,19 +293,17 @@ def _center_distance(cycle: MeshCycle) -> Scalar:
     return pinion + jnp.hypot(contact.wheel_base_radius, contact.wheel_pitch_roll_length)
 
 
-def _friction(owner: str, cycle: MeshCycle, lubricant: Lubricant | None) -> Scalar:
+def _friction(cycle: MeshCycle, lubricant: Lubricant | None) -> Scalar:
     if cycle.operating_point.friction is not None:
         return cycle.operating_point.friction
     if lubricant is None:
-        raise ValueError(
-            f"{owner}: needs a coefficient of friction, solve with OperatingPoint(torque, speed, friction)"
-        )
+        raise ValueError("needs a coefficient of friction, solve with OperatingPoint(torque, speed, friction)")
     return friction_coefficient(cycle, lubricant)
 
 
-def _running(owner: str, cycle: MeshCycle) -> Scalar:
+def _running(cycle: MeshCycle) -> Scalar:
     """Speed of the pinion [rpm]."""
     speed = cycle.operating_point.speed
     if speed is None:
-        raise ValueError(f"{owner}: needs a speed, solve with OperatingPoint(torque, speed)")
+        raise ValueError("needs a speed, solve with OperatingPoint(torque, speed)")
     return speed

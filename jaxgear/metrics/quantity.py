@@ -145,11 +145,11 @@ class Quantity(eqx.Module):
             TypeError: for settings of another class than it takes.
             ValueError: where a field is missing that it needs.
         """
-        owner = type(settings).__name__
+        given = type(settings).__name__
         if self.takes is None or not isinstance(settings, self.takes):
-            raise TypeError(f"{self.name}: takes {getattr(self.takes, '__name__', 'no settings')}, not {owner}")
+            raise TypeError(f"{self.name}: takes {getattr(self.takes, '__name__', 'no settings')}, not {given}")
         if self.needs and getattr(settings, self.needs) is None:
-            raise ValueError(f'{owner}: quantity "{self.name}" needs {self.needs}')
+            raise ValueError(f'{given}: quantity "{self.name}" needs {self.needs}')
         return replace(self, settings=settings)
 
     def __call__(self, analysis: Analysis | MeshCycle) -> Numbers:
@@ -167,7 +167,11 @@ class Quantity(eqx.Module):
         """
         if isinstance(analysis, MeshCycle):
             analysis = Analysis(analysis)
-        given = self.of(analysis.cycle) if self.takes is None else self._with_settings(analysis, self.takes)
+        try:
+            given = self.of(analysis.cycle) if self.takes is None else self._with_settings(analysis, self.takes)
+        except ValueError as error:
+            error.args = (f"{self.name}: {error}",)
+            raise
         try:
             values = jnp.asarray(given)
         except (TypeError, ValueError):
@@ -186,7 +190,7 @@ class Quantity(eqx.Module):
         if self.without is None:
             name = f"{takes.__module__.rpartition('.')[0]}.{takes.__name__}"
             table = f", or a design file with the table [{takes.table}]" if takes.table else ""
-            raise ValueError(f'{self.name}: needs settings, give {name}(...).quantity("{self.name}"){table}')
+            raise ValueError(f'needs settings, give {name}(...).quantity("{self.name}"){table}')
         return self.of(analysis, None)
 
 
@@ -238,12 +242,11 @@ class Vocabulary(Mapping[str, Quantity]):
         hint = f'did you mean "{near[0]}"?' if near else f"must be one of {', '.join(self)}"
         return f'"{name}" is not known, {hint}'
 
-    def quantity_of(self, of: str | Quantity | Callable[[MeshCycle], Any], owner: str = "quantity") -> Quantity:
+    def quantity_of(self, of: str | Quantity | Callable[[MeshCycle], Any]) -> Quantity:
         """The quantity that is meant by a name in either spelling, a `Quantity`, or a function of a cycle.
 
         Args:
             of: the quantity; a function is taken for a quantity of its own name that gives a single number.
-            owner: name of the caller, for the message.
 
         Raises:
             ValueError: for an unknown name, with the nearest known one.
@@ -254,7 +257,7 @@ class Vocabulary(Mapping[str, Quantity]):
             return Quantity(getattr(of, "__name__", type(of).__name__), of)
         found = self._find(of)
         if found is None:
-            raise ValueError(f"{owner}: {self.not_known(of)}")
+            raise ValueError(self.not_known(of))
         return found
 
     def _find(self, name: object) -> Quantity | None:

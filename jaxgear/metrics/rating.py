@@ -54,7 +54,7 @@ def _flash(analysis: Analysis, lubricant: Lubricant | None) -> Load:
         return lubricated_flash_temperature(analysis.cycle, lubricant)
     speed, friction = analysis.operating_point.speed, analysis.operating_point.friction
     if speed is None:
-        raise ValueError("max_flash_temperature: needs a speed, solve with OperatingPoint(torque, speed)")
+        raise ValueError("needs a speed, solve with OperatingPoint(torque, speed)")
     return flash_temperature(analysis.cycle, speed, **({} if friction is None else {"friction": friction}))
 
 

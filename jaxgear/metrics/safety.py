@@ -86,8 +86,8 @@ def safety_factor(borne: Real, reached: Real) -> Real:
     return borne / jnp.maximum(reached, borne / LARGEST_SAFETY)
 
 
-def _safety(owner: str, strength: Strength, name: Mode, stress: Any) -> tuple[Real, Real]:
-    pinion, wheel = strengths_of(owner, strength, name)
+def _safety(strength: Strength, name: Mode, stress: Any) -> tuple[Real, Real]:
+    pinion, wheel = strengths_of(strength, name)
     factor = _stress_factor(strength, name)
     return safety_factor(pinion, factor * stress.pinion), safety_factor(wheel, factor * stress.wheel)
 
@@ -100,13 +100,13 @@ def _stress_factor(strength: Strength, name: Mode) -> Scalar:
 @over_batch
 def pitting_safety(cycle: MeshCycle, strength: Strength) -> tuple[Scalar, Scalar]:
     """S_H of pinion and wheel: pitting strength over the nominal contact stress."""
-    return _safety("pitting_safety", strength, "pitting", nominal_contact_stress(cycle))
+    return _safety(strength, "pitting", nominal_contact_stress(cycle))
 
 
 @over_batch
 def root_safety(cycle: MeshCycle, strength: Strength) -> tuple[Scalar, Scalar]:
     """S_F of pinion and wheel after ISO 6336-3: bending strength over the nominal root stress."""
-    return _safety("root_safety", strength, "bending", nominal_root_stress(cycle))
+    return _safety(strength, "bending", nominal_root_stress(cycle))
 
 
 @over_batch
@@ -115,13 +115,13 @@ def local_root_safety(cycle: MeshCycle, strength: Strength) -> tuple[Load, Load]
 
     Larger than the standard's S_F where a pair that touches early or late shares the load.
     """
-    return _safety("local_root_safety", strength, "bending", root_stress(cycle))
+    return _safety(strength, "bending", root_stress(cycle))
 
 
 @over_batch
 def pressure_safety(cycle: MeshCycle, strength: Strength) -> Load:
     """p_lim / p at every contact, on the flanks and at the tip edges."""
-    limit = given_strength("pressure_safety", strength, "pressure")
+    limit = given_strength(strength, "pressure")
     return safety_factor(limit, jnp.sqrt(strength.load_factor) * (cycle.contact_pressure + cycle.corner_pressure))
 
 
@@ -132,7 +132,7 @@ def micropitting_safety(cycle: MeshCycle, lubricant: Lubricant) -> Load:
     Raises:
         ValueError: for a lubricant without `permissible_film`.
     """
-    limit = given_strength("micropitting_safety", lubricant, "permissible_film")
+    limit = given_strength(lubricant, "permissible_film")
     return safety_factor(specific_film_thickness(cycle, lubricant), limit)
 
 
@@ -148,22 +148,22 @@ def scuffing_safety(cycle: MeshCycle, lubricant: Lubricant) -> Load:
     References:
         ISO/TS 6336-20 (ISO/TR 13989-1), flash temperature method.
     """
-    limit = given_strength("scuffing_safety", lubricant, "scuffing_temperature")
+    limit = given_strength(lubricant, "scuffing_temperature")
     oil = lubricant.temperature
     return safety_factor(limit - oil, contact_temperature(cycle, lubricant) - oil)
 
 
-def strengths_of(owner: str, strength: Strength, name: str) -> tuple[Scalar, Scalar]:
+def strengths_of(strength: Strength, name: str) -> tuple[Scalar, Scalar]:
     """Strength `name` of pinion and wheel, the wheel's by default the pinion's; raises a `ValueError` without any."""
-    pinion, wheel = given_strength(owner, strength, name), getattr(strength, f"wheel_{name}")
+    pinion, wheel = given_strength(strength, name), getattr(strength, f"wheel_{name}")
     return pinion, pinion if wheel is None else wheel
 
 
-def given_strength(owner: str, settings: Checked, name: str) -> Scalar:
+def given_strength(settings: Checked, name: str) -> Scalar:
     """A number of settings; raises a `ValueError` where it is not given."""
     value = getattr(settings, name)
     if value is None:
-        raise ValueError(f"{owner}: needs {type(settings).__name__}.{name}")
+        raise ValueError(f"needs {type(settings).__name__}.{name}")
     return value
 
 
@@ -191,15 +191,14 @@ def root_damage(cycle: MeshCycle, strength: Strength) -> tuple[Scalar, Scalar]:
 
 
 def _damage(cycle: MeshCycle, name: Mode, strength: Strength, stress: Any) -> tuple[Scalar, Scalar]:
-    pinion, wheel = damage_per_cycle(f"{name} damage", strength, name, (stress.pinion, stress.wheel))
+    pinion, wheel = damage_per_cycle(strength, name, (stress.pinion, stress.wheel))
     return REVOLUTIONS * pinion, REVOLUTIONS * wheel / cycle.kinematics.pair.gear_ratio
 
 
-def damage_per_cycle(owner: str, strength: Strength, name: Mode, stresses: tuple[Real, Real]) -> tuple[Real, Real]:
+def damage_per_cycle(strength: Strength, name: Mode, stresses: tuple[Real, Real]) -> tuple[Real, Real]:
     """Damage of pinion and wheel by one load cycle of each, 1 / N of their S-N curves.
 
     Args:
-        owner: name of the caller, for messages.
         strength: strengths with the S-N curve.
         name: "pitting" or "bending".
         stresses: nominal stress of pinion and wheel [MPa].
@@ -208,7 +207,7 @@ def damage_per_cycle(owner: str, strength: Strength, name: Mode, stresses: tuple
         ValueError: for a strength without that S-N curve.
     """
     factor = _stress_factor(strength, name)
-    curves = zip(*(strengths_of(owner, strength, each) for each in (name, f"{name}_exponent", f"{name}_cycles")))
+    curves = zip(*(strengths_of(strength, each) for each in (name, f"{name}_exponent", f"{name}_cycles")))
     pinion, wheel = (
         (factor * stress / limit) ** exponent / cycles for stress, (limit, exponent, cycles) in zip(stresses, curves)
     )

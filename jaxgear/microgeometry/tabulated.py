@@ -34,7 +34,7 @@ class TabulatedProfile(AbstractModification):
                 f"TabulatedProfile: position {self.position.shape} and amount {self.amount.shape} must be two lists of "
                 "the same length, at least 2"
             )
-        _check_increasing("TabulatedProfile", "position", self.position)
+        _check_increasing("TabulatedProfile: position", self.position)
 
     def __call__(self, flank: Flank) -> Float[Array, "..."]:
         x = flank.roll_length
@@ -67,8 +67,8 @@ class TabulatedFlank(AbstractModification):
                 f"TabulatedFlank: amount has shape {self.amount.shape}, must be {wanted}: one row per roll length, one "
                 "column per face coordinate"
             )
-        _check_increasing("TabulatedFlank", "roll_length", self.roll_length)
-        _check_increasing("TabulatedFlank", "face_coordinate", self.face_coordinate)
+        _check_increasing("TabulatedFlank: roll_length", self.roll_length)
+        _check_increasing("TabulatedFlank: face_coordinate", self.face_coordinate)
 
     @property
     def varies_along_face(self) -> bool:
@@ -84,7 +84,7 @@ class TabulatedFlank(AbstractModification):
         return (1 - share) * at(left) + share * at(left + 1)
 
 
-def _check_increasing(owner: str, name: str, positions: Array) -> None:
+def _check_increasing(name: str, positions: Array) -> None:
     known = concrete(positions)
     if known is not None and not (known[1:] > known[:-1]).all():
-        raise ValueError(f"{owner}: {name} must increase strictly")
+        raise ValueError(f"{name} must increase strictly")

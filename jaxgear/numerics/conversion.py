@@ -15,10 +15,10 @@ Numbers = Given | Sequence[Given] | Sequence[Sequence[Given]]
 
 
 class Callback(Protocol):
-    """Function that is called with the progress of a sweep or a search; an exception in it ends the work."""
+    """Function called with the progress of a sweep, search or wear history; an exception in it ends the work."""
 
     def __call__(self, done: int, total: int, best: float | None, /) -> None:
-        """Receive the variants or steps done, their total number and the best objective so far (None without one)."""
+        """Receive the variants, steps or revolutions done, their total and the best objective (None without one)."""
 
 
 _SHOWN = 6  # numbers of an array that are printed; of a longer one its range is

@@ -23,7 +23,7 @@ _Module = TypeVar("_Module", bound=eqx.Module)
 _MOST = 2**53  # whole numbers up to here are exact as floating-point numbers too, in every reader of a table
 _KEY = "number"  # of a `Number` in the metadata of its field
 _LOG = logging.getLogger(f"{__name__.partition('.')[0]}.unusual")
-_asked: set[tuple[str, str]] = set()  # classes and fields that were warned of: a search makes thousands of objects
+_warned: set[tuple[str, str]] = set()  # classes and fields that were warned of: a search makes thousands of objects
 
 
 class Usual(NamedTuple):
@@ -150,8 +150,13 @@ class Checked(eqx.Module):
     """
 
     def __check_init__(self) -> None:
-        for field in dataclasses.fields(self):
-            _check_field(type(self).__name__, field, getattr(self, field.name))
+        try:
+            for field in dataclasses.fields(self):
+                _check_field(field, getattr(self, field.name))
+        except (TypeError, ValueError) as error:
+            error.args = (f"{type(self).__name__}: {error}",)
+            raise
+        _warn_of_unusual(self)
         self.check_together()
 
     def check_together(self) -> None:
@@ -172,7 +177,6 @@ def changed(module: _Module, **fields: object) -> _Module:
 
 
 def check(
-    owner: str,
     name: str,
     value: Numbers | None,
     unit: str,
@@ -185,7 +189,6 @@ def check(
     """Raises a one-line `ValueError` when a concrete value is not finite or outside its allowed range.
 
     Args:
-        owner: who the parameter belongs to, for the message.
         name: parameter name, for the message.
         value: number or array; tracers and None pass.
         unit: unit of the value, for the message ("" for a pure number).
@@ -196,7 +199,7 @@ def check(
     if known is None:
         return
     if known.dtype.kind not in "biuf":
-        raise ValueError(f"{owner}: {no_number(name, value)}")
+        raise ValueError(no_number(name, value))
     bad = ~np.isfinite(known)
     if low is not None:
         bad |= (known <= low) if open_low else (known < low)
@@ -206,17 +209,15 @@ def check(
         return
     shown = known[bad].flat[0] if known.ndim else known
     unit_text = f" {unit}" if unit else ""
-    raise ValueError(
-        f"{owner}: {name} = {float(shown):g}{unit_text} {_range(low, high, open_low, open_high, unit_text)}"
-    )
+    raise ValueError(f"{name} = {float(shown):g}{unit_text} {_range(low, high, open_low, open_high, unit_text)}")
 
 
-def whole(owner: str, name: str, value: object, low: float = 1, high: float = _MOST) -> int:
+def whole(name: str, value: object, low: float = 1, high: float = _MOST) -> int:
     """The value as an int; raises a one-line `ValueError` unless it is a whole number from `low` to `high`."""
     if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < low:
-        raise ValueError(f"{owner}: {name} = {value!r} must be a whole number of at least {low}")
+        raise ValueError(f"{name} = {value!r} must be a whole number of at least {low}")
     if value > high:
-        raise ValueError(f"{owner}: {name} = {value!r} must be at most {'2^53' if high == _MOST else high}")
+        raise ValueError(f"{name} = {value!r} must be at most {'2^53' if high == _MOST else high}")
     return int(value)
 
 
@@ -227,83 +228,82 @@ def _plain(value):
     return value.item() if isinstance(value, np.generic) else value
 
 
-def _check_field(owner: str, field: dataclasses.Field[Any], value: object) -> None:
+def _check_field(field: dataclasses.Field[Any], value: object) -> None:
     kind = field.metadata.get(_KEY)
     if kind is not None:
         if kind.checked:
-            _check_number(owner, field.name, value, kind)
+            _check_number(field.name, value, kind)
     elif get_origin(field.type) is Literal:
         options = get_args(field.type)
         if not isinstance(value, str) or value not in options:
             *first, last = [f'"{option}"' for option in options]
-            raise ValueError(f"{owner}: {field.name} = {value!r} must be {', '.join(first)} or {last}")
+            raise ValueError(f"{field.name} = {value!r} must be {', '.join(first)} or {last}")
     elif field.type is bool and not isinstance(value, bool | np.bool_):
-        raise ValueError(f"{owner}: {field.name} = {value!r} must be True or False")
+        raise ValueError(f"{field.name} = {value!r} must be True or False")
     elif isinstance(field.type, type) and issubclass(field.type, eqx.Module) and not isinstance(value, field.type):
         given = value.__name__ if isinstance(value, type) else type(value).__name__
         # most often the class where an object of it is meant
         made = f": write {given}(...)" if isinstance(value, type) and issubclass(value, field.type) else ""
-        raise TypeError(f"{owner}: {field.name} is {shown(value)}, must be of type {field.type.__name__}{made}")
+        raise TypeError(f"{field.name} is {shown(value)}, must be of type {field.type.__name__}{made}")
 
 
-def _check_number(owner: str, name: str, value, kind: Number) -> None:
+def _check_number(name: str, value, kind: Number) -> None:
     if value is None and kind.optional:
         return
     if kind.static:
         if kind.shape:
             if not isinstance(value, tuple) or not value:
-                raise ValueError(f"{owner}: {name} = {value!r} must be a list of whole numbers")
+                raise ValueError(f"{name} = {value!r} must be a list of whole numbers")
             for item in value:
-                _check_number(owner, name, item, dataclasses.replace(kind, shape=(), optional=False))
+                _check_number(name, item, dataclasses.replace(kind, shape=(), optional=False))
             return
         if kind.whole:
             assert kind.low is not None and kind.high is not None  # `count` gives both
-            whole(owner, name, value, kind.low, kind.high)
+            whole(name, value, kind.low, kind.high)
             return
         if isinstance(value, bool) or not isinstance(value, float | int | np.floating | np.integer):
-            raise ValueError(f"{owner}: {no_number(name, value)}")
+            raise ValueError(no_number(name, value))
     else:
         if not isinstance(value, jax.Array) or value.dtype.kind in "bc":  # the converter has left it as it was
-            raise ValueError(f"{owner}: {no_number(name, value)}")
-        _check_shape(owner, name, value.shape, kind)
-    check(owner, name, value, kind.unit, low=kind.low, high=kind.high, open_low=kind.open_low, open_high=kind.open_high)
+            raise ValueError(no_number(name, value))
+        _check_shape(name, value.shape, kind)
+    check(name, value, kind.unit, low=kind.low, high=kind.high, open_low=kind.open_low, open_high=kind.open_high)
     if kind.limits and (known := concrete(value)) is not None and known.ndim and not known[0] <= known[1]:
         unit = f" {kind.unit}" if kind.unit else ""
         limits = f"{float(known[1]):g}{unit} must be at least the lower one, {float(known[0]):g}{unit}"
-        raise ValueError(f"{owner}: {name}: upper limit {limits}")
-    if kind.usual is not None:
-        _ask(owner, name, value, kind.usual)
+        raise ValueError(f"{name}: upper limit {limits}")
     known = concrete(value) if kind.whole else None
     if known is not None and (known != known.round()).any():
         shown = float(known[known != known.round()].flat[0])
-        raise ValueError(f"{owner}: {name} = {shown:g} must be a whole number")
+        raise ValueError(f"{name} = {shown:g} must be a whole number")
 
 
-def _ask(owner: str, name: str, value, usual: Usual) -> None:
-    known = concrete(value)
-    if known is None or (owner, name) in _asked:
-        return
-    size = np.abs(known)
-    unusual = (size > 0) & ((size < usual.low) | (size > usual.high))
-    if unusual.any():
-        _asked.add((owner, name))
-        shown = float(known[unusual].flat[0] if known.ndim else known)
-        _LOG.warning("%s: %s = %g %s is %s", owner, name, shown, usual.unit, usual.missed_by(abs(shown)))
+def _warn_of_unusual(module: Checked) -> None:
+    made = type(module).__name__
+    for name, kind in fields_of(type(module)).items():
+        if kind.usual is None or (made, name) in _warned or (known := concrete(getattr(module, name))) is None:
+            continue
+        size = np.abs(known)
+        unusual = (size > 0) & ((size < kind.usual.low) | (size > kind.usual.high))
+        if unusual.any():
+            _warned.add((made, name))
+            shown = float(known[unusual].flat[0] if known.ndim else known)
+            _LOG.warning("%s: %s = %g %s is %s", made, name, shown, kind.usual.unit, kind.usual.missed_by(abs(shown)))
 
 
-def _check_shape(owner: str, name: str, shape: tuple[int, ...], kind: Number) -> None:
+def _check_shape(name: str, shape: tuple[int, ...], kind: Number) -> None:
     if len(shape) == len(kind.shape) and all(length >= kind.fewest for length in shape):
         return
     if kind.limits:
         if shape == (2,):
             return
-        raise ValueError(f"{owner}: {name} has shape {shape}, must be a single number, or lower and upper limit")
+        raise ValueError(f"{name} has shape {shape}, must be a single number, or lower and upper limit")
     if not kind.shape:
-        raise ValueError(f"{owner}: {name} has shape {shape}, must be a single number; make many with jax.vmap")
+        raise ValueError(f"{name} has shape {shape}, must be a single number; make many with jax.vmap")
     least = f"at least {kind.fewest} " if kind.fewest > 1 else ""
     wanted = "a list of" if len(kind.shape) == 1 else f"a table ({' x '.join(kind.shape)}) of"
     unit = "numbers" if len(kind.shape) == 1 or not least else "numbers along every axis"
-    raise ValueError(f"{owner}: {name} has shape {shape}, must be {wanted} {least}{unit}")
+    raise ValueError(f"{name} has shape {shape}, must be {wanted} {least}{unit}")
 
 
 def _range(low, high, open_low, open_high, unit_text) -> str:

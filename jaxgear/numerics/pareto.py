@@ -30,7 +30,7 @@ def pareto_front(values: Numbers) -> np.ndarray:
     """
     values = np.asarray(values, float)
     if values.ndim != 2 or not values.shape[1]:
-        raise ValueError(f"pareto_front: values has shape {values.shape}, must be (rows, at least 1 objective)")
+        raise ValueError(f"values has shape {values.shape}, must be (rows, at least 1 objective)")
     front = np.zeros(len(values), bool)
     rows = np.flatnonzero(np.isfinite(values).all(axis=1))
     if rows.size == 0:

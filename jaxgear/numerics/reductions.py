@@ -196,7 +196,7 @@ class Harmonic(AbstractReduction):
     order: int
 
     def __post_init__(self) -> None:
-        whole("Harmonic", "order", self.order, 1)
+        whole("Harmonic: order", self.order, 1)
 
     def __call__(self, values: Values) -> Real:
         count = values.shape[-1]

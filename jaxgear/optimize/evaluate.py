@@ -46,9 +46,9 @@ class _Given(NamedTuple):
 
 @overload
 def evaluate(
-    quantities: One,
     mesh: Mesh,
     torque: Torque,
+    quantities: One,
     *,
     pinion: AbstractModification | None = None,
     wheel: AbstractModification | None = None,
@@ -57,9 +57,9 @@ def evaluate(
 
 @overload
 def evaluate(
-    quantities: Several,
     mesh: Mesh,
     torque: Torque,
+    quantities: Several,
     *,
     pinion: AbstractModification | None = None,
     wheel: AbstractModification | None = None,
@@ -67,9 +67,9 @@ def evaluate(
 
 
 def evaluate(
-    quantities: One | Several,
     mesh: Mesh,
     torque: Torque,
+    quantities: One | Several,
     *,
     pinion: AbstractModification | None = None,
     wheel: AbstractModification | None = None,
@@ -80,12 +80,12 @@ def evaluate(
     quantities are a largest or a smallest value of positions, or both as PPTE is, they are differentiated at the
     positions that decide them alone: value and gradient of PPTE take half the time of those through `solve`.
 
-        slope = jax.grad(lambda amount: evaluate("ppte", mesh, 50.0, pinion=jg.TipRelief(amount, 4.0)))(7.0)
+        slope = jax.grad(lambda amount: evaluate(mesh, 50.0, "ppte", pinion=jg.TipRelief(amount, 4.0)))(7.0)
 
     Args:
-        quantities: name, `Quantity` or function of a mesh cycle; or a list of them.
         mesh: prepared mesh.
         torque: on the pinion [N m], scalar; or an `OperatingPoint`.
+        quantities: name, `Quantity` or function of a mesh cycle; or a list of them.
         pinion: modification of the pinion flank; None for the nominal involute.
         wheel: modification of the wheel flank; None for the nominal involute.
 
@@ -96,13 +96,13 @@ def evaluate(
     Raises:
         TypeError, ValueError: as `solve` does; for a quantity that is not known or lacks its settings, and for none.
     """
-    check_mesh("evaluate", mesh)
+    check_mesh(mesh)
     several = quantities if isinstance(quantities, list | tuple) else [quantities]
     if not several:
-        raise ValueError("evaluate: quantities is empty, give at least one")
-    wanted, settings = share_settings([quantity_of(each, "evaluate") for each in several])
-    operating_point = operating_point_of("evaluate", torque, mesh.slice_width.dtype)
-    given = _Given(mesh, operating_point, *flanks_of("evaluate", mesh, pinion, wheel), settings)
+        raise ValueError("quantities is empty, give at least one")
+    wanted, settings = share_settings([quantity_of(each) for each in several])
+    operating_point = operating_point_of(torque, mesh.slice_width.dtype)
+    given = _Given(mesh, operating_point, *flanks_of(mesh, pinion, wheel), settings)
     if is_eager() or not all(each.local and _pieces(each) for each in wanted):
         numbers = _numbers(wanted, given)
     else:

@@ -1,9 +1,9 @@
 """Flanks of free form, every value of a table a parameter, and the named curve nearest to one."""
 
-import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from functools import partial
 from types import MappingProxyType
+from typing import ClassVar
 
 import equinox as eqx
 import jax
@@ -12,8 +12,7 @@ import numpy as np
 import scipy
 from jaxtyping import Array, Float
 
-from ..conditions import Parameters, conditions, solve_case
-from ..conditions.cases import Loads
+from ..conditions import Parameters, solve_case
 from ..contact import Mesh, MeshCycle, Side
 from ..metrics import peak_to_peak, removed_at
 from ..microgeometry import (
@@ -26,20 +25,16 @@ from ..microgeometry import (
     TabulatedProfile,
     TipRelief,
 )
-from ..numerics import AbstractMeasure, Callback, Mean, check, program, real, whole
+from ..numerics import changed, program, real
+from ..numerics.fields import Checked, count, number
 from ..sizing import iso_relief
-from ..tolerance import Tolerance
-from ..vocabulary import quantities
-from .goal import Constraint
 from .linear_model import Linearizer
-from .problem import Problem, Roughness, goals_of
-from .refine import POSITIONS, refined
+from .method import AbstractSearch
+from .problem import Problem, Roughness
 from .result import Optimum
 from .search import Record
 from .slp import Search, follow
-from .verdict import optimum_of
 
-_FEWEST = 4  # values per flank
 _RTOL = 1e-3  # a search ends where the predicted decrease is below this part of the objective
 
 
@@ -58,99 +53,69 @@ class _Tables(eqx.Module):
         return TabulatedProfile(self.roll[0], values[0]), TabulatedProfile(self.roll[1], values[1])
 
 
-def free_form(
-    mesh: Mesh,
-    torque: Loads,
-    *,
-    points: int = 40,
-    max_relief: float = 20.0,
-    curvature: float = 1e-3,
-    measure: AbstractMeasure | None = None,
-    constraints: Sequence[Constraint] = (),
-    tolerance: Tolerance | None = None,
-    samples: int | None = None,
-    seed: int = 0,
-    start: tuple[AbstractModification, AbstractModification] | None = None,
-    steps: int = 60,
-    positions: int | None = POSITIONS,
-    callback: Callback | None = None,
-) -> Optimum:
-    """Finds the flanks with the least PPTE, whatever their form, by sequential linear programming.
+class FreeForm(Checked, AbstractSearch):
+    """Flanks of any form with the least PPTE, or the best of something else, by sequential linear programming.
 
     Each flank is a table of material removed from the pitch point to the tip, linear in between. What pinion and wheel
     remove where they touch adds up, so that two addenda reach every point of the path of contact. The penalty on the
     largest curvature keeps the flanks smooth and the local contact pressure down: 1 um/mm^2 is 0.001 / mm, to be
     compared with the curvature of the pair, 1 / R.
 
-    Args:
-        mesh: prepared mesh.
-        torque: on the pinion [N m], or a `LoadSpectrum`.
+    The values of the tables are its variables, in place of those of the problem. The objective of its optimum includes
+    the penalty. Material that a flank loses alike all over, and no variation shows, is not removed, unless constraints
+    may depend on it.
+
+    Attributes:
         points: values per flank.
-        max_relief: largest material removed [um].
+        max_relief: largest material removed.
         curvature: penalty on the largest second derivative of either table, PPTE in um per um/mm^2.
-        measure: of the PPTE over torques and manufactured gears: `Mean()`, `Worst()` or `CVaR(level)`; None for the
-            mean.
-        constraints: limits that hold in every case; they can name no single parameter.
-        tolerance, samples, seed: of manufactured gears, as for `minimize`.
-        start: modifications to start from besides unmodified flanks; None for the rule-based relief.
         steps: most steps.
-        positions: of the finer mesh on which the search ends, as for `minimize`.
-        callback: called as callback(step, steps, best objective).
-
-    Returns:
-        the optimum; its objective includes the penalty, its parameters are the values of both tables. What a flank
-        has in common all over, and no variation shows, is not removed, unless constraints may depend on it.
-
-    Raises:
-        ValueError: for numbers outside their range.
-        RuntimeError: when no design gave a converged contact solution.
+        start: modifications to start from besides unmodified flanks; None for the rule-based relief.
     """
-    whole("free_form", "points", points, _FEWEST)
-    whole("free_form", "steps", steps, 1)
-    check("free_form", "max_relief", max_relief, "um", low=0.0, open_low=True)
-    check("free_form", "curvature", curvature, "um/(um/mm^2)", low=0.0)
-    if any(limit.quantity is None for limit in constraints):
-        raise ValueError("free_form: a linear constraint names parameters, and the values of a table have no names")
-    began = time.perf_counter()
-    judged = conditions("free_form", mesh, torque, tolerance=tolerance, samples=samples, seed=seed)
-    roll = _roll_lengths(mesh, points)
-    width = len(str(points))
-    objectives, limits, settings = goals_of([quantities["ppte"]], constraints)
-    problem = Problem(
-        design=_Tables(roll),
-        names=tuple(f"{gear} {number + 1:0{width}d}" for gear in ("pinion", "wheel") for number in range(points)),
-        low=jnp.zeros(2 * points, roll.dtype),
-        high=jnp.full(2 * points, max_relief, roll.dtype),
-        mesh=mesh,
-        conditions=judged,
-        cases=judged.on(mesh),
-        objectives=objectives,
-        measure=measure or Mean(),
-        constraints=limits,
-        settings=settings,
-        roughness=_roughness(roll, max_relief, curvature),
-    )
-    heaviest = float(judged.load.torques[int(np.argmax(judged.load.weights))])
-    if start is None:
-        relief = iso_relief(mesh.pair, heaviest)
-        start = relief, relief
-    record = Record(problem, callback)
-    unmodified = np.zeros(2 * points)
-    given = np.clip(_values(mesh, roll, start) / max_relief, 0.0, 1.0)
-    starts = [Search(unmodified), Search(given)]
-    record.linearizer = Linearizer(problem, len(starts))
-    follow(record.linearizer, record, starts, steps=steps, rtol=_RTOL)
-    record.check()
 
-    def polished(problem, record, point):
-        follow(record.linearizer, record, [Search(point)], steps=steps, rtol=_RTOL)
+    name: ClassVar[str] = "free_form"
+    takes_variables: ClassVar[bool] = False
+    points: int = count(low=4, default=40)
+    max_relief: float = number("um", low=0.0, open_low=True, static=True, default=20.0)
+    curvature: float = number("", low=0.0, static=True, default=1e-3)
+    steps: int = count(default=60)
+    start: tuple[AbstractModification, AbstractModification] | None = None
 
-    found = refined(record, polished, positions)
-    record = found.record
-    if not constraints:  # which may depend on what both flanks have in common
-        flanks = record.point.reshape(2, points)
-        record.point = (flanks - flanks.min(axis=1, keepdims=True)).ravel()
-    return optimum_of(record, "free_form", began, found.change)
+    def pose(self, problem: Problem) -> Problem:
+        if any(limit.quantity is None for limit in problem.constraints):
+            raise ValueError("a linear constraint names parameters, and the values of a table have no names")
+        roll, width = _roll_lengths(problem.mesh, self.points), len(str(self.points))
+        numbers = [f"{number:0{width}d}" for number in range(1, self.points + 1)]
+        return changed(
+            problem,
+            design=_Tables(roll),
+            names=tuple(f"{gear} {number}" for gear in ("pinion", "wheel") for number in numbers),
+            low=jnp.zeros(2 * self.points, roll.dtype),
+            high=jnp.full(2 * self.points, self.max_relief, roll.dtype),
+            roughness=_roughness(roll, self.max_relief, self.curvature),
+        )
+
+    def search(self, problem: Problem, record: Record) -> None:
+        """Advances two searches, from unmodified flanks and from the start."""
+        mesh, load, start = problem.mesh, problem.conditions.load, self.start
+        if start is None:
+            relief = iso_relief(mesh.pair, float(load.torques[int(np.argmax(load.weights))]))
+            start = relief, relief
+        given = _values(mesh, problem.design.roll, start) / self.max_relief  # type: ignore[attr-defined]
+        starts = [Search(np.zeros(2 * self.points)), Search(np.clip(given, 0.0, 1.0))]
+        record.linearizer = Linearizer(problem, len(starts))
+        follow(record.linearizer, record, starts, steps=self.steps, rtol=_RTOL)
+
+    def polish(self, problem: Problem, record: Record, point: np.ndarray) -> None:
+        """Searches again from the design."""
+        linearizer = record.linearizer or Linearizer(problem, 1)
+        follow(linearizer, record, [Search(point)], steps=self.steps, rtol=_RTOL)
+
+    def finish(self, record: Record) -> None:
+        """Gives back what both flanks have in common, unless constraints may depend on it."""
+        if not record.problem.constraints:
+            flanks = record.point.reshape(2, self.points)
+            record.point = (flanks - flanks.min(axis=1, keepdims=True)).ravel()
 
 
 def _roll_lengths(mesh: Mesh, points: int):
@@ -229,14 +194,14 @@ def project(optimum: Optimum, curve: str = "power") -> Projection:
     minimizes the distance of the flanks, not the PPTE: `minimize` with the same curve finds a better one.
 
     Args:
-        optimum: of `free_form` or `iterate_transmission_error`.
+        optimum: of `FreeForm` or `TransmissionErrorIteration`.
         curve: "linear", "power", "parabolic_linear", "quadratic" or "cubic".
 
     Raises:
         ValueError: for an unknown curve.
     """
     if curve not in CURVES:
-        raise ValueError(f'project: curve = "{curve}" is not known, must be one of {", ".join(CURVES)}')
+        raise ValueError(f'curve = "{curve}" is not known, must be one of {", ".join(CURVES)}')
     mesh, torque = optimum.mesh, optimum.cycle.operating_point
     fits = [_fit(side, flank, curve) for side, flank in zip(mesh.sides, (optimum.pinion, optimum.wheel))]
     pinion, wheel = (relief for relief, _ in fits)

@@ -53,7 +53,7 @@ class Constraint(Checked):
     def __init__(
         self, of: Objective | Mapping[str, float], *, low: Numbers | None = None, high: Numbers | None = None
     ) -> None:
-        self.quantity = None if isinstance(of, Mapping) else quantity_of(of, "Constraint")
+        self.quantity = None if isinstance(of, Mapping) else quantity_of(of)
         self.terms = tuple(of.items()) if isinstance(of, Mapping) else ()
         self.low, self.high = optional_real(low), optional_real(high)
 
@@ -62,8 +62,8 @@ class Constraint(Checked):
             raise ValueError("Constraint: a linear constraint must name at least one free parameter")
         if self.low is None and self.high is None:
             raise ValueError("Constraint: low or high must be given")
-        check("Constraint", "low", self.low, "")
-        check("Constraint", "high", self.high, "", low=self.low)
+        check("Constraint: low", self.low, "")
+        check("Constraint: high", self.high, "", low=self.low)
 
     def of_parameters(self, parameters: Mapping[str, Any]) -> Scalar:
         """Weighted sum of the free parameters that a linear constraint limits, shape ()."""

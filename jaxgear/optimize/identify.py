@@ -311,11 +311,11 @@ def _further(problem: _Problem, z: Vector, data: Data, size: Scalar, candidate: 
 
 
 def identify(
+    mesh: Mesh,
+    measurement: Measurement,
     design: Design,
     prior: Prior,
-    measurement: Measurement,
     *,
-    mesh: Mesh,
     torque_scale: float | None = 0.01,
     offset: float | None = None,
     single_pitch: Pitches | None = None,
@@ -332,10 +332,10 @@ def identify(
     computer models, J. R. Stat. Soc. B 63, 2001).
 
     Args:
+        mesh: prepared mesh.
+        measurement: measured transmission error.
         design: makes (pinion, wheel) modifications from the named unknowns.
         prior: mean and standard deviation of every unknown in its unit, such as that of the tolerance class.
-        measurement: the data.
-        mesh: prepared mesh.
         torque_scale: standard deviation of the factor between measured and true torque; None for a right one.
         offset: standard deviation of what is added to every reading [um]; None for absolute readings.
         single_pitch: standard deviations of the single pitch deviations of pinion and wheel, see `TeethDeviations`
@@ -351,11 +351,11 @@ def identify(
             or pitch deviations without an offset.
         TypeError: for something else than a prepared mesh.
     """
-    check("identify", "model_error", model_error, "", low=0.0, high=1.0)
-    whole("identify", "steps", steps, low=1)
+    check("model_error", model_error, "", low=0.0, high=1.0)
+    whole("steps", steps, low=1)
     for torque in candidates:
-        check("identify", "candidates", torque, "N m", low=0.0, open_low=True)
-    problem, data = _posed(design, prior, measurement, mesh, torque_scale, offset, single_pitch, model_error)
+        check("candidates", torque, "N m", low=0.0, open_low=True)
+    problem, data = _posed(mesh, measurement, design, prior, torque_scale, offset, single_pitch, model_error)
     found = _fit(problem, data, steps)
     z = found.z
     more = [_further(problem, z, data, found.size, jnp.asarray(torque, z.dtype)) for torque in candidates]
@@ -364,34 +364,34 @@ def identify(
 
 
 def _posed(
+    mesh: Mesh,
+    measurement: Measurement,
     design: Design,
     prior: Prior,
-    measurement: Measurement,
-    mesh: Mesh,
     scale: float | None,
     offset: float | None,
     single_pitch: Pitches | None,
     model_error: float,
 ) -> tuple[_Problem, Data]:
-    check_mesh("identify", mesh)
+    check_mesh(mesh)
     if not prior:
-        raise ValueError("identify: prior must name at least one unknown")
+        raise ValueError("prior must name at least one unknown")
     every = dict(prior)
     for name, middle, known in ((TORQUE_SCALE, 1.0, scale), (OFFSET, 0.0, offset)):
         if name in prior:
-            raise ValueError(f"identify: prior names {name}, give {name} = its standard deviation")
+            raise ValueError(f"prior names {name}, give {name} = its standard deviation")
         if known is not None:
             every[name] = (middle, known)
     for name, (middle, known) in every.items():
-        check("identify", f"prior mean of {name}", middle, "")
-        check("identify", f"prior standard deviation of {name}", known, "", low=0.0, open_low=True)
+        check(f"prior mean of {name}", middle, "")
+        check(f"prior standard deviation of {name}", known, "", low=0.0, open_low=True)
     period, own, spreads = period_of(measurement, mesh.pair, single_pitch, offset), len(every), single_pitch or _EQUAL
     counts = Teeth().counts_of(mesh.pair)
     for gear, count, known in zip(GEARS, counts, spreads):
         if known is not None:
             pitches = {f"{gear}_pitch_{tooth}": (0.0, known) for tooth in range(count)}
             if taken := pitches.keys() & every.keys():
-                raise ValueError(f"identify: prior names {min(taken)}, a pitch deviation: choose another name")
+                raise ValueError(f"prior names {min(taken)}, a pitch deviation: choose another name")
             every |= pitches
     data, windows = joined(measurement, mesh, period)
     mean, spread = (jnp.asarray([known[end] for known in every.values()], data.value.dtype) for end in (0, 1))
@@ -415,12 +415,12 @@ def period_of(measurement: Measurement, pair: GearPair, single_pitch: Pitches | 
         return 1
     for gear, known in zip(GEARS, single_pitch):
         if known is not None:
-            check("identify", f"single_pitch of the {gear}", known, "um", low=0.0, open_low=True)
+            check(f"single_pitch of the {gear}", known, "um", low=0.0, open_low=True)
     if offset is None:
-        raise ValueError("identify: offset must be unknown with pitch deviations, no tooth is the right one")
+        raise ValueError("offset must be unknown with pitch deviations, no tooth is the right one")
     covered = float(np.ptp(np.asarray(measurement.phase)))
     if covered <= 1:
-        raise ValueError(f"identify: phase covers {covered:.2g} base pitches, pitch deviations need whole revolutions")
+        raise ValueError(f"phase covers {covered:.2g} base pitches, pitch deviations need whole revolutions")
     return lcm(*(count for count, known in zip(Teeth().counts_of(pair), single_pitch) if known is not None))
 
 
@@ -442,13 +442,11 @@ def _gaps(mesh: Mesh, windows: np.ndarray, counts: Sequence[int], spreads: Seque
 
 
 def _check_used(design: Design, prior: Prior, mesh: Mesh, torque: float) -> None:
-    cases = conditions("identify", mesh, torque)
+    cases = conditions(mesh, torque)
     made = Variants(tuple(prior), design, mesh, None, cases, cases.on(mesh))
     used = made.traced([np.asarray(mean, float) for mean, _ in prior.values()])[1]
     if unused := [name for name in prior if name not in used]:
-        raise ValueError(
-            f"identify: nothing depends on {', '.join(unused)}: use it in design, or leave it out of prior"
-        )
+        raise ValueError(f"nothing depends on {', '.join(unused)}: use it in design, or leave it out of prior")
 
 
 def _found(problem: _Problem, data: Data, fit: _Fit, candidates: Array, told_by_candidates: Array) -> Identified:

@@ -3,25 +3,25 @@
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, Literal, NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
 
-from ..conditions import Design, cycle_status, solve_case, solved
+from ..conditions import cycle_status, solve_case, solved
 from ..contact import Mesh, MeshCycle
 from ..contact.mesh import later, parts
 from ..contact.status import Status
 from ..metrics import max_relief as largest_relief
 from ..metrics import removed_at
 from ..microgeometry import AbstractModification, NoModification, TabulatedProfile
-from ..numerics import Callback, check, whole
+from ..numerics import Callback, check
+from ..numerics.fields import Checked, count, number
 from .goal import Constraint, counted
-from .minimize import minimize
-from .refine import POSITIONS, fine_enough, on_finer_meshes
+from .method import SLP, AbstractMethod
+from .problem import Problem
+from .refine import fine_enough, on_finer_meshes
 from .result import Iterate, Limit, Optimum
-from .search import AbstractMethod
-from .slp import SLP
 
 
 class IteratedFlanks:
@@ -86,6 +86,12 @@ _UNTOUCHED = 0.05  # [um]: a flank with less relief than this counts as unmodifi
 _LOADED = 1e-6  # a pair with less than this share of the force carries none
 _STEEPEST = 2.0  # slant of a relief that begins a quarter of the way to the tip, and is three times as high there
 _HALVINGS = 5  # of the range of slants: the slant is the least one within 1/16
+
+
+class _Start(NamedTuple):
+    pinion: AbstractModification
+    wheel: AbstractModification
+    evaluations: int
 
 
 class Levelled(NamedTuple):
@@ -211,7 +217,7 @@ def _solve(mesh: Mesh, torque, pinion: AbstractModification, wheel: AbstractModi
     cycle = solve_case(mesh, torque, pinion, wheel)
     if not solved(cycle):
         status = Status(int(cycle_status(cycle)))
-        raise RuntimeError(f"iterate_transmission_error: a contact solution failed: {status.text}: {status.remedy}")
+        raise RuntimeError(f"a contact solution failed: {status.text}: {status.remedy}")
     return cycle
 
 
@@ -240,20 +246,8 @@ def _iterate(mesh: Mesh, cycle: MeshCycle, alone: np.ndarray, pinion, wheel) -> 
     )
 
 
-def iterate_transmission_error(
-    mesh: Mesh,
-    torque: float,
-    *,
-    pinion: AbstractModification | None = None,
-    wheel: AbstractModification | None = None,
-    max_relief: float = 7.0,
-    max_pressure: float | None = None,
-    rtol: float = 0.1,
-    steps: int = 5,
-    positions: int | None = POSITIONS,
-    callback: Callback | None = None,
-) -> Optimum:
-    """Levels the transmission error by taking it off the flanks.
+class TransmissionErrorIteration(Checked, AbstractMethod):
+    """Iteration that levels the transmission error by taking it off the flanks.
 
     While one pair alone carries the load its deflection is given. Where two pairs share it the gears lag less, by
     h = q_max - q: that much is taken off both flanks there, off the pinion in recess and off the wheel in approach, so
@@ -275,121 +269,110 @@ def iterate_transmission_error(
     multiplied by 1 + t (2 u - 1), not less than 0, with the least slant t from 0 to 2 that keeps the pressure of flanks
     and tip edges within that limit. The height at the tip follows from the pressure, as it does in the study.
 
-    Args:
-        mesh: prepared mesh.
-        torque: on the pinion, at which the transmission error is levelled [N m].
-        pinion, wheel: modifications to start from (the study's type 2); None for the nominal involute (its type 1).
-        max_relief: most that is left removed anywhere [um].
-        max_pressure: largest pressure of flanks and tip edges [MPa]; None for no limit.
+    Its optimum is the state with the least PPTE of those within the limit of the pressure, or else with the least
+    pressure; `Optimum.iterations` has all of them. The pressure is judged on a finer mesh of `positions`, doubled until
+    its limit is kept at four times as many, too; all else on the mesh of the problem.
+
+    Attributes:
+        start: flanks of the first step: involutes ("unmodified", the study's type 1), the design of a problem without
+            variables ("given", its type 2), or the one of its variables with the least contact pressure
+            ("low_pressure", its type 3).
+        max_relief: most that is left removed anywhere, by the start too.
+        max_pressure: largest pressure of flanks and tip edges; None for no limit.
         rtol: ends the iteration where PPTE is within this part of its lower limit, or has fallen by less than
             this part of itself.
         steps: most steps.
-        positions: of the finer mesh on which the pressure is judged, doubled until its limit is kept at four times as
-            many, too; None for those of `mesh`, on which all else is evaluated.
-        callback: called as callback(step, steps, best PPTE).
-
-    Returns:
-        the state with the least PPTE of those within the limit of the pressure, or else with the least pressure;
-        `iterations` has all of them.
-
-    Raises:
-        ValueError: for numbers outside their range.
-        RuntimeError: when a contact solution does not converge.
+        search: method of the search for the start of low pressure.
     """
-    check("iterate_transmission_error", "torque", torque, "N m", low=0.0, open_low=True)
-    check("iterate_transmission_error", "max_relief", max_relief, "um", low=0.0, open_low=True)
-    if max_pressure is not None:
-        check("iterate_transmission_error", "max_pressure", max_pressure, "MPa", low=0.0, open_low=True)
-    check("iterate_transmission_error", "rtol", rtol, "", low=0.0, open_low=True)
-    whole("iterate_transmission_error", "steps", steps, 1)
-    began = time.perf_counter()
-    given = pinion or NoModification(), wheel or NoModification()
-    limit = None if max_pressure is None else Constraint("max_contact_pressure", high=max_pressure)
-    spent: list[int] = []
 
-    def end_on(finer: Mesh, between: bool = True) -> tuple[Levelled, bool]:
-        flanks = IteratedFlanks(mesh, *given, float(max_relief))
-        pressure = Pressure(limit, torque, parts(finer, mesh.resolution.positions))
-        found = levelled(mesh, flanks, pressure, rtol, steps, spent, callback)
-        return found, between and pressure.holds_between(found, finer)
+    name: ClassVar[str] = "te_iteration"
+    takes_variables: ClassVar[bool] = False
+    start: Literal["unmodified", "given", "low_pressure"] = "unmodified"
+    max_relief: float = number("um", low=0.0, open_low=True, static=True, default=7.0)
+    max_pressure: float | None = number("MPa", low=0.0, open_low=True, static=True, optional=True, default=None)
+    rtol: float = number("", low=0.0, open_low=True, static=True, default=0.1)
+    steps: int = count(default=5)
+    search: AbstractMethod = SLP()
 
-    if limit is None or positions is None:
-        found, _ = end_on(mesh, between=False)
-    else:
-        found = on_finer_meshes("iterate_transmission_error", mesh, positions, end_on)
-    best, highest = found.iterates[found.best], found.pressures[found.best]
-    limits = {"max_relief": Limit(best.max_relief, None, float(max_relief), "um", True)}
-    excess = 0.0
-    if max_pressure is not None:
-        excess = max(highest / float(max_pressure) - 1, 0.0)
-        limits["max_contact_pressure"] = Limit(highest, None, float(max_pressure), "MPa", excess == 0.0)
-    return Optimum(
-        method="te_iteration",
-        objective_name="ppte",
-        parameters={},
-        pinion=best.pinion,
-        wheel=best.wheel,
-        mesh=mesh,
-        cycle=found.cycles[found.best],
-        ppte=best.ppte,
-        objective=best.ppte,
-        objective_unit="um",
-        positions=mesh.resolution.positions,
-        grid_change=float("nan"),
-        optimality=float("nan"),
-        active_bounds={},
-        constraints=limits,
-        violation=excess,
-        evaluations=sum(spent),
-        history=np.asarray(found.reached),
-        history_evaluations=np.cumsum(spent)[-len(found.reached) :],
-        seconds=time.perf_counter() - began,
-        iterations=tuple(found.iterates),
-    )
+    def find(
+        self, problem: Problem, *, positions: int | None, rounding: Mapping[str, float], callback: Callback | None
+    ) -> Optimum:
+        """Runs the iteration.
 
+        Raises:
+            ValueError: for several torques, manufactured gears, constraints, another objective than PPTE, or rounding.
+            RuntimeError: when a contact solution does not converge.
+        """
+        began, mesh, torque = time.perf_counter(), problem.mesh, float(problem.cases.torque[0])
+        self._check(problem, rounding)
+        first = self._first(problem, callback)
+        limit = None if self.max_pressure is None else Constraint("max_contact_pressure", high=self.max_pressure)
+        spent: list[int] = []
 
-def iterate_from_low_pressure(
-    design: Design,
-    bounds: Mapping[str, tuple[float, float]],
-    mesh: Mesh,
-    torque: float,
-    *,
-    max_relief: float = 7.0,
-    method: AbstractMethod = SLP(),
-    callback: Callback | None = None,
-    **options: Any,
-) -> Optimum:
-    """The iteration from the relief of a design that has the least contact pressure (the study's type 3).
+        def end_on(finer: Mesh, between: bool = True) -> tuple[Levelled, bool]:
+            flanks = IteratedFlanks(mesh, *first[:2], self.max_relief)
+            pressure = Pressure(limit, torque, parts(finer, mesh.resolution.positions))
+            found = levelled(mesh, flanks, pressure, self.rtol, self.steps, spent, callback)
+            return found, between and pressure.holds_between(found, finer)
 
-    Args:
-        design, bounds: of the relief to start from, as for `minimize`.
-        mesh: prepared mesh.
-        torque: on the pinion [N m].
-        max_relief: most that is left removed anywhere, by the start too [um].
-        method: of the search for the start.
-        callback: of the search for the start and of the iteration.
-        options: further ones of `iterate_transmission_error`.
+        if limit is None or positions is None:
+            found, _ = end_on(mesh, between=False)
+        else:
+            found = on_finer_meshes(mesh, positions, end_on)
+        best, highest = found.iterates[found.best], found.pressures[found.best]
+        limits = {"max_relief": Limit(best.max_relief, None, self.max_relief, "um", True)}
+        excess = 0.0
+        if self.max_pressure is not None:
+            excess = max(highest / self.max_pressure - 1, 0.0)
+            limits["max_contact_pressure"] = Limit(highest, None, self.max_pressure, "MPa", excess == 0.0)
+        return Optimum(
+            method=self.name,
+            objective_name="ppte",
+            parameters={},
+            pinion=best.pinion,
+            wheel=best.wheel,
+            mesh=mesh,
+            cycle=found.cycles[found.best],
+            ppte=best.ppte,
+            objective=best.ppte,
+            objective_unit="um",
+            positions=mesh.resolution.positions,
+            grid_change=float("nan"),
+            optimality=float("nan"),
+            active_bounds={},
+            constraints=limits,
+            violation=excess,
+            evaluations=first.evaluations + sum(spent),
+            history=np.asarray(found.reached),
+            history_evaluations=first.evaluations + np.cumsum(spent)[-len(found.reached) :],
+            seconds=time.perf_counter() - began,
+            iterations=tuple(found.iterates),
+        )
 
-    Returns:
-        as `iterate_transmission_error`, with the analyses and the time of the start.
-    """
-    limit = Constraint("max_relief", high=max_relief)
-    start = minimize(
-        design,
-        bounds,
-        mesh=mesh,
-        torque=torque,
-        objective="max_contact_pressure",
-        constraints=(limit,),
-        method=method,
-        positions=None,
-        callback=callback,
-    )
-    options |= {"max_relief": max_relief, "callback": callback}
-    found = iterate_transmission_error(mesh, torque, pinion=start.pinion, wheel=start.wheel, **options)
-    return replace(
-        found,
-        evaluations=found.evaluations + start.evaluations,
-        history_evaluations=found.history_evaluations + start.evaluations,
-        seconds=found.seconds + start.seconds,
-    )
+    def _check(self, problem: Problem, rounding: Mapping[str, float]) -> None:
+        check("torque", problem.cases.torque, "N m", low=0.0, open_low=True)
+        if problem.cases.count > 1 or problem.cases.removed is not None:
+            raise ValueError("te_iteration levels the transmission error of nominal gears at a single torque")
+        if [of.name for of in problem.objectives] != ["ppte"]:
+            raise ValueError("objective must be ppte with te_iteration")
+        if problem.constraints or rounding:
+            raise ValueError("constraints and rounding have no effect with te_iteration; max_pressure is its limit")
+        if self.start == "given" and problem.names:
+            raise ValueError('start = "given" needs a design without variables')
+
+    def _first(self, problem: Problem, callback: Callback | None) -> _Start:
+        """The flanks of the first step, and the contact analyses that they took."""
+        if self.start == "unmodified":
+            return _Start(NoModification(), NoModification(), 0)
+        if self.start == "given":
+            return _Start(*problem.modifications(np.empty(0)), 0)
+        posed = Problem(
+            problem.mesh,
+            problem.cases.first,
+            problem.design,
+            problem.bounds,
+            objective="max_contact_pressure",
+            constraints=(Constraint("max_relief", high=self.max_relief),),
+        )
+        found = self.search.find(posed, positions=None, rounding={}, callback=callback)
+        return _Start(found.pinion, found.wheel, found.evaluations)

@@ -110,11 +110,11 @@ def noise_of(measurement: Measurement, bins: Bins) -> Scalar:
         return measurement.noise
     value, free = measurement.transmission_error, len(bins.row) - len(bins.level)
     if free < LEAST_ROWS:
-        raise ValueError(f"identify: noise = None needs {LEAST_ROWS} repeated readings or more, are {free}")
+        raise ValueError(f"noise = None needs {LEAST_ROWS} repeated readings or more, are {free}")
     noise = jnp.sqrt(jnp.sum((value - bins.mean(value)[bins.row]) ** 2) / free)
     known = concrete(noise)
     if known is not None and not known > 0:
-        raise ValueError("identify: repeated readings are all alike, noise must be given [um]")
+        raise ValueError("repeated readings are all alike, noise must be given [um]")
     return noise
 
 

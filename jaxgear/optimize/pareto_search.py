@@ -1,21 +1,18 @@
 """Pareto fronts of several objectives."""
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
 from typing import ClassVar
 
 import numpy as np
 
-from ..conditions import Design
-from ..conditions.cases import Loads
 from ..contact import Mesh
-from ..numerics import AbstractMeasure, Callback, halton
+from ..numerics import Callback, halton
 from ..numerics.fields import Checked, count
 from ..numerics.pareto import pareto_front
-from ..tolerance import Tolerance
-from .goal import Constraint, Objective, counted
+from .goal import counted
 from .linear_model import AbstractScalarization, Linearizer, LinearModel
-from .problem import Problem, make_problem
+from .problem import Problem
 from .refine import POSITIONS, at_more_positions, fine_enough, on_finer_meshes, seek_limits
 from .result import Front
 from .search import Record, start_points
@@ -123,7 +120,7 @@ class Met:
             seek_limits(self.record.linearizer, self, self.compromise()[0])
         if not self.found:
             raise RuntimeError(
-                "pareto: no evaluated design meets the constraints, also when their violation alone is minimized"
+                "no evaluated design meets the constraints, also when their violation alone is minimized"
             )
         self.thin(most)
 
@@ -222,52 +219,32 @@ class Pareto(Checked):
 
 
 def pareto(
-    design: Design,
-    bounds: Mapping[str, tuple[float, float]],
-    mesh: Mesh,
-    torque: Loads,
-    *,
-    objectives: Sequence[Objective] = ("ppte", "max_contact_pressure"),
-    measure: AbstractMeasure | None = None,
-    constraints: Sequence[Constraint] = (),
-    tolerance: Tolerance | None = None,
-    samples: int | None = None,
-    seed: int = 0,
+    problem: Problem,
     method: Pareto = Pareto(),
+    *,
     positions: int | None = POSITIONS,
     callback: Callback | None = None,
 ) -> Front:
     """Finds the designs of which none is better in all of several objectives.
 
     Args:
-        objectives: two or more quantities, as in `minimize`.
+        problem: mesh, loads, design, bounds and two or more objectives.
         method: how many designs are sought, and in how many steps.
+        positions: of the finer mesh on which the search ends, as for `minimize`.
         callback: called as callback(step, steps, distance of the compromise from the ideal).
 
-    The other arguments are those of `minimize`. Values are those on the mesh of the compromise, on which the search
-    ends: limits hold at twice its positions, too.
+    Returns:
+        the front; its values are those on the mesh of the compromise, on which the search ends: limits hold at twice
+        its positions, too.
 
     Raises:
-        ValueError: for fewer than two objectives, and whatever `minimize` refuses.
+        ValueError: for fewer than two objectives.
         RuntimeError: when no design keeps the constraints.
     """
-    if isinstance(objectives, str) or callable(objectives) or len(objectives) < 2:
-        raise ValueError("pareto: objectives must be at least two quantities; a single one is for jaxgear.minimize")
+    if len(problem.objectives) < 2:
+        raise ValueError("objective must be at least two quantities; a single one is for jaxgear.minimize")
     began = time.perf_counter()
-    posed = make_problem(
-        design,
-        bounds,
-        mesh=mesh,
-        torque=torque,
-        objective=objectives,
-        measure=measure,
-        constraints=constraints,
-        tolerance=tolerance,
-        samples=samples,
-        seed=seed,
-        owner="pareto",
-    )
-    met = method.search(posed, Record(posed, callback))
+    met = method.search(problem, Record(problem, callback))
     if positions is not None:
 
         def end_on(finer: Mesh) -> tuple[Met, bool]:
@@ -275,20 +252,20 @@ def pareto(
             met, enough = method.end_on(finer, met)
             return met, enough
 
-        met = on_finer_meshes("pareto", mesh, positions, end_on)
+        met = on_finer_meshes(problem.mesh, positions, end_on)
     record = met.record
     record.offer(*met.compromise(), 0.0)
     points, values = met.rows()
     left = _evidence(record, points, values, met.frame()[1], method.points)
     chosen = int(np.abs(points - record.point).max(axis=1).argmin())
-    low, high = np.asarray(posed.low), np.asarray(posed.high)
+    low, high = np.asarray(problem.low), np.asarray(problem.high)
     parameters = low + points * (high - low)
     compromise = optimum_of(record, method.name, began, left=float(left[chosen]))
     return Front(
-        objectives=tuple(of.name for of in posed.objectives),
-        units=tuple(of.unit for of in posed.objectives),
-        values=values * np.asarray([of.sign for of in posed.objectives]),
-        parameters={name: parameters[:, index] for index, name in enumerate(posed.names)},
+        objectives=tuple(of.name for of in problem.objectives),
+        units=tuple(of.unit for of in problem.objectives),
+        values=values * np.asarray([of.sign for of in problem.objectives]),
+        parameters={name: parameters[:, index] for index, name in enumerate(problem.names)},
         optimality=left,
         compromise=compromise,
         chosen=chosen,
@@ -297,14 +274,14 @@ def pareto(
 
 def _evidence(record: Record, points, values, span, batch: int) -> np.ndarray:
     """Fastest decrease of all objectives at once that is left at every point."""
-    left, posed = np.empty(len(points)), record.problem
-    linearizer = record.linearizer or Linearizer(posed, batch)
+    left, problem = np.empty(len(points)), record.problem
+    linearizer = record.linearizer or Linearizer(problem, batch)
     for start in range(0, len(points), batch):
         rows = slice(start, min(start + batch, len(points)))
-        record.spend(len(points[rows]), analyses=posed.gradient_cost)
+        record.spend(len(points[rows]), analyses=problem.gradient_cost)
         for index, found in zip(range(rows.start, rows.stop), linearizer(points[rows])):
             way = Descent(values[index], span)
-            left[index] = LinearModel(posed, points[index], found, way).optimality(PROBE)
+            left[index] = LinearModel(problem, points[index], found, way).optimality(PROBE)
     return left
 
 

@@ -1,4 +1,4 @@
-"""Searches that follow no gradient: evolution, the genetic algorithm of bit strings, full factorial tables."""
+"""Searches that follow no gradient: evolution (evosax) and full factorial tables."""
 
 import functools
 from abc import abstractmethod
@@ -10,13 +10,13 @@ from typing import ClassVar
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-import numpy as np
 
-from ..numerics import decoded, next_generation, random_strings, whole
+from ..numerics import whole
 from ..numerics.fields import Checked, count, number
 from ..sweeps import FullFactorial
+from .method import AbstractSearch
 from .problem import Problem
-from .search import AbstractMethod, Record, fitness
+from .search import Record, fitness
 
 _LEAST_POPULATION, _MOST = 4, 100_000
 # Mutation of the genetic algorithm: standard deviation in the unit box, falling geometrically over the generations so
@@ -24,7 +24,7 @@ _LEAST_POPULATION, _MOST = 4, 100_000
 _FIRST_MUTATION, _LAST_MUTATION = 0.2, 0.002
 
 
-class _Evolution(Checked, AbstractMethod):
+class _Evolution(Checked, AbstractSearch):
     """Generations of a population in the unit box; individuals outside it are moved to its surface.
 
     Attributes:
@@ -70,7 +70,7 @@ class Genetic(_Evolution):
     """Genetic algorithm with real genes (evosax.SimpleGA): uniform crossover, Gaussian mutation, the better half mates.
 
     The defaults are the population, the generations and the crossover rate of the genetic-algorithm study of the 19/48
-    pair, whose own algorithm codes its genes in bits (`BinaryGenetic`). Mutation shrinks here over the generations.
+    pair, whose own algorithm codes its genes in bits. Mutation shrinks here over the generations.
 
     Attributes:
         crossover: share of the genes that come from the second parent.
@@ -140,58 +140,12 @@ def _evosax():
     return evosax.algorithms
 
 
-_MOST_BITS = 24  # as many as a number of single precision holds
-
-
-class BinaryGenetic(Checked, AbstractMethod):
-    """Genetic algorithm of bit strings: roulette-wheel selection, one-point crossover, fitness 1 / objective.
-
-    Every generation replaces the one before it; the best design of all is kept apart. The defaults are those of the
-    genetic-algorithm study of the 19/48 pair but for the bits, which it does not say. Its "mutation with a probability
-    of 0.5" is that with which one bit of a string flips. A design that passes a limit has next to no chance to be
-    selected beside those that keep all.
-
-    Attributes:
-        population: designs per generation.
-        generations: how many.
-        bits: of every parameter, whose range they divide into 2^bits - 1 steps.
-        crossover: probability with which a design has the end of its string from a second parent.
-        mutation: probability with which one bit of a design flips.
-        seed: of the random numbers.
-
-    Raises:
-        ValueError: for an objective that is negative, or that is to be large: its inverse is no fitness.
-    """
-
-    name: ClassVar[str] = "binary_genetic"
-    population: int = count(low=2, high=_MOST, default=100)
-    generations: int = count(high=_MOST, default=100)
-    bits: int = count(high=_MOST_BITS, default=10)
-    crossover: float = number("", low=0.0, high=1.0, static=True, default=0.5)
-    mutation: float = number("", low=0.0, high=1.0, static=True, default=0.5)
-    seed: int = count(low=0, high=2**31 - 1, default=0)
-
-    def search(self, problem: Problem, record: Record) -> None:
-        """Runs the generations."""
-        key, first = jax.random.split(jax.random.key(self.seed))
-        strings = random_strings(first, self.population, len(problem.names), self.bits)
-        for generation in range(1, self.generations + 1):
-            ranks = np.asarray(fitness(record.judge(decoded(strings, self.bits))))
-            if (ranks < 0).any():
-                raise ValueError("binary_genetic: needs a positive objective that is minimized")
-            record.look(generation, self.generations)
-            key, breed = jax.random.split(key)
-            # relative to the best, so that neither an objective of zero nor its unit matters
-            least = np.maximum(ranks, np.finfo(ranks.dtype).tiny)
-            strings = next_generation(breed, strings, jnp.asarray(least.min() / least), self.crossover, self.mutation)
-
-
 _LEVELS = 5
 _MOST_DESIGNS = 10**7
 _CHUNK = 2048  # designs between two looks
 
 
-class Factorial(AbstractMethod):
+class Factorial(AbstractSearch):
     """Every combination of equally spaced levels of every parameter, bounds included.
 
     Attributes:
@@ -207,7 +161,7 @@ class Factorial(AbstractMethod):
 
     def __check_init__(self) -> None:
         for value in [self.levels] if isinstance(self.levels, int) else dict(self.levels).values():
-            whole("Factorial", "levels", value, 2)
+            whole("Factorial: levels", value, 2)
 
     def search(self, problem: Problem, record: Record) -> None:
         """Evaluates all."""

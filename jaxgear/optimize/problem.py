@@ -1,7 +1,7 @@
 """The optimization problem that all methods share: a box of parameters, cases, objectives and constraints."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from types import MappingProxyType
 from typing import NamedTuple, TypeVar
 
 import equinox as eqx
@@ -15,6 +15,7 @@ from ..conditions import (
     Conditions,
     Design,
     Modifications,
+    Parameters,
     Variants,
     call_with,
     check_used,
@@ -29,9 +30,9 @@ from ..contact import Mesh, removed_material, solve_removed
 from ..contact.status import Status, Statuses, status_of
 from ..metrics import AbstractSettings, Analysis, Quantity, share_settings
 from ..microgeometry import AbstractModification
-from ..numerics import AbstractMeasure, Mean, changed, maximum, real
+from ..numerics import AbstractMeasure, Mean, Numbers, changed, maximum, real
 from ..sweeps.plan import box
-from ..tolerance import Tolerance
+from ..tolerance import ManufacturedGears
 from ..vocabulary import quantity_of
 from .goal import Constraint, Objective, scale_of
 from .linearization import Linearization, Pieces, Sloped, any_slopes, local_slopes, pieces_of
@@ -72,24 +73,29 @@ class Roughness(eqx.Module):
     weight: Scalar
 
 
-class Problem(eqx.Module):
-    """Minimize measures of quantities over cases, within a box and constraints; parameters live in the unit box.
+def unmodified(parameters: Parameters) -> Modifications:
+    """Design of nominal involutes."""
+    return None, None
 
-    `make_problem` makes one. For an optimizer of your own: `score` is what any method needs, `linearize` what a
-    sequence of linear programs needs, `parameters` and `modifications` say what a point means. All are traceable, so
-    that `jax.vmap(problem.score)` judges many points and `jax.grad` goes through `score`.
+
+class Problem(eqx.Module):
+    """Minimize measures of quantities over cases, within a box and constraints; variables live in the unit box.
+
+    For an optimizer of your own: `score` is what any method needs, `linearize` what a sequence of linear programs
+    needs, `parameters` and `modifications` say what a point means. All are traceable, so that
+    `jax.vmap(problem.score)` judges many points and `jax.grad` goes through `score`.
 
     Attributes:
-        design: makes (pinion, wheel) modifications from the named parameters.
-        names: of the parameters.
-        low, high: their bounds, shape (parameters,).
+        design: makes (pinion, wheel) modifications from the named variables.
+        names: of the variables.
+        low, high: their bounds, shape (variables,).
         mesh: prepared mesh.
         conditions: loads and manufactured gears, with the `cases` that they make on the mesh.
         objectives: quantities; those of which large values are the better ones are made large.
         measure: turns the numbers of the cases into one.
         constraints: limits that hold in every case.
         settings: that objectives and constraints share, see `metrics.share_settings`.
-        roughness: penalty on the parameters, None without.
+        roughness: penalty on the variables, None without.
     """
 
     design: Design
@@ -101,9 +107,62 @@ class Problem(eqx.Module):
     cases: Cases
     objectives: tuple[Quantity, ...] = eqx.field(static=True)
     measure: AbstractMeasure
-    constraints: tuple[Constraint, ...] = ()
-    settings: tuple[AbstractSettings, ...] = ()
-    roughness: Roughness | None = None
+    constraints: tuple[Constraint, ...]
+    settings: tuple[AbstractSettings, ...]
+    roughness: Roughness | None
+
+    def __init__(
+        self,
+        mesh: Mesh,
+        torque: Loads,
+        design: Design = unmodified,
+        bounds: Mapping[str, tuple[float, float]] = MappingProxyType({}),
+        *,
+        objective: Objective | Sequence[Objective] = "ppte",
+        measure: AbstractMeasure | None = None,
+        constraints: Sequence[Constraint] = (),
+        manufactured: ManufacturedGears | None = None,
+        roughness: Roughness | None = None,
+    ) -> None:
+        """Poses the problem.
+
+        Args:
+            mesh: prepared mesh.
+            torque: on the pinion [N m], or a `LoadSpectrum`.
+            design: makes (pinion, wheel) modifications from the named variables; traced, so it must be pure. Nominal
+                involutes for a method that brings its own variables.
+            bounds: (low, high) of every variable, in the unit that `design` expects; none for such a method.
+            objective: a quantity, or several for `pareto`: its name, a `Quantity`, or a function of a cycle. It is made
+                large where large values are the better ones.
+            measure: of the objective over torques and manufactured gears: `Mean()`, `Worst()`, `Quantile(level)` or
+                `CVaR(level)`; None for the mean.
+            constraints: limits that hold in every case.
+            manufactured: manufactured gears, which run under every torque; None for nominal gears.
+            roughness: penalty on the variables; None without.
+
+        Raises:
+            ValueError: for reversed bounds, unknown names of objectives or constrained variables, a variable
+                on which nothing depends, and whatever the cases refuse.
+        """
+        self.names, *ends = box(bounds) if bounds else ((), (), ())
+        several = [objective] if isinstance(objective, str | Quantity) or callable(objective) else list(objective)
+        if not several:
+            raise ValueError("objective must name at least one quantity")
+        for name in (name for constraint in constraints for name, _ in constraint.terms):
+            if name not in self.names:
+                raise ValueError(f'"{name}" of a constraint must be one of {", ".join(self.names)}')
+        self.design, self.mesh, self.roughness, self.measure = design, mesh, roughness, measure or Mean()
+        self.low, self.high = (real(np.asarray(side, np.dtype(mesh.slice_width.dtype))) for side in ends)
+        self.conditions = conditions(mesh, torque, manufactured)
+        self.cases = self.conditions.on(mesh)
+        limited = [limit.quantity for limit in constraints if limit.quantity is not None]
+        bare, self.settings = share_settings([*map(quantity_of, several), *limited])
+        self.objectives, of_limits = bare[: len(several)], iter(bare[len(several) :])
+        self.constraints = tuple(
+            limit if limit.quantity is None else changed(limit, quantity=next(of_limits)) for limit in constraints
+        )
+        made = Variants(self.names, design, mesh, None, self.conditions, self.cases)
+        check_used(self.names, made.traced(np.asarray(self.low))[1])
 
     def __str__(self) -> str:
         what = ", ".join(of.name for of in self.objectives)
@@ -111,7 +170,13 @@ class Problem(eqx.Module):
 
     def on(self, mesh: Mesh) -> "Problem":
         """Copy of the problem on another mesh."""
-        return replace(self, mesh=mesh, cases=self.conditions.on(mesh))
+        return changed(self, mesh=mesh, cases=self.conditions.on(mesh))
+
+    @property
+    def bounds(self) -> dict[str, tuple[float, float]]:
+        """(low, high) of every variable by its name."""
+        low, high = np.asarray(self.low).tolist(), np.asarray(self.high).tolist()
+        return dict(zip(self.names, zip(low, high)))
 
     @property
     def is_made_of_extremes(self) -> bool:
@@ -273,66 +338,6 @@ def _worst(excess):
     return jnp.maximum(maximum(excess), 0.0) if excess.size else jnp.zeros((), excess.dtype)
 
 
-def real_points(problem: Problem, points: np.ndarray | Array) -> jax.Array:
+def real_points(problem: Problem, points: Numbers) -> jax.Array:
     """Points of the unit box in the type of the problem."""
     return jnp.asarray(points, problem.low.dtype)
-
-
-def goals_of(
-    objectives: Sequence[Quantity], constraints: Sequence[Constraint]
-) -> tuple[tuple[Quantity, ...], tuple[Constraint, ...], tuple[AbstractSettings, ...]]:
-    """Objectives, constraints and settings of a problem: settings that several quantities have in common once."""
-    limited = [limit.quantity for limit in constraints if limit.quantity is not None]
-    bare, settings = share_settings([*objectives, *limited])
-    of_limits = iter(bare[len(objectives) :])
-    limits = (limit if limit.quantity is None else changed(limit, quantity=next(of_limits)) for limit in constraints)
-    return bare[: len(objectives)], tuple(limits), settings
-
-
-def make_problem(
-    design: Design,
-    bounds: Mapping[str, tuple[float, float]],
-    mesh: Mesh,
-    torque: Loads,
-    *,
-    objective: Objective | Sequence[Objective] = "ppte",
-    measure: AbstractMeasure | None = None,
-    constraints: Sequence[Constraint] = (),
-    tolerance: Tolerance | None = None,
-    samples: int | None = None,
-    seed: int = 0,
-    owner: str = "minimize",
-) -> Problem:
-    """Checked problem from the arguments of `minimize`; `owner` is the name of the caller, for messages.
-
-    Raises:
-        ValueError: for empty or reversed bounds, unknown names of objectives or constrained parameters, and whatever
-            the cases refuse.
-    """
-    names, *ends = box(owner, bounds)
-    several = [objective] if isinstance(objective, str | Quantity) or callable(objective) else list(objective)
-    if not several:
-        raise ValueError(f"{owner}: objective must name at least one quantity")
-    for constraint in constraints:
-        for name, _ in constraint.terms:
-            if name not in names:
-                raise ValueError(f'{owner}: "{name}" of a constraint must be one of {", ".join(names)}')
-    judged = conditions(owner, mesh, torque, tolerance=tolerance, samples=samples, seed=seed)
-    objectives, limits, settings = goals_of([quantity_of(of, owner) for of in several], constraints)
-    low, high = (real(np.asarray(side, np.dtype(mesh.slice_width.dtype))) for side in ends)
-    posed = Problem(
-        design=design,
-        names=names,
-        low=low,
-        high=high,
-        mesh=mesh,
-        conditions=judged,
-        cases=judged.on(mesh),
-        objectives=objectives,
-        measure=measure or Mean(),
-        constraints=limits,
-        settings=settings,
-    )
-    made = Variants(names, design, mesh, None, judged, posed.cases)
-    check_used("minimize", names, made.traced(np.asarray(posed.low))[1])
-    return posed

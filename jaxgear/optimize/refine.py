@@ -75,7 +75,7 @@ def refined(
         now = np.asarray([[ends.value]]), np.asarray([ends.violation])
         return Refined(ends, change, found), fine_enough(*now, values, violations)
 
-    return on_finer_meshes("minimize", problem.mesh, positions, end_on)
+    return on_finer_meshes(problem.mesh, positions, end_on)
 
 
 def _on_steps(record: Record, steps: Mapping[str, float], polish: Polish) -> Record:
@@ -86,19 +86,18 @@ def _on_steps(record: Record, steps: Mapping[str, float], polish: Polish) -> Rec
     return record if counted(found.violation) > counted(record.violation) else found
 
 
-def on_finer_meshes(owner: str, mesh: Mesh, positions: int, end_on: Callable[[Mesh], tuple[Found, bool]]) -> Found:
+def on_finer_meshes(mesh: Mesh, positions: int, end_on: Callable[[Mesh], tuple[Found, bool]]) -> Found:
     """The end of a search on a finer mesh.
 
     The positions are doubled until what is found changes little when they are doubled again, and keeps its limits
     there, too.
 
     Args:
-        owner: name of the caller, for messages.
         mesh: of the search.
         positions: of the first finer mesh, at least those of the mesh.
         end_on: ends the search on a finer mesh; tells what it has found and whether that mesh is fine enough.
     """
-    whole(owner, "positions", positions)
+    whole("positions", positions)
     count = max(positions, mesh.resolution.positions)
     while True:
         found, enough = end_on(_with_positions(mesh, count))

@@ -1,12 +1,11 @@
 """The best design in steps that a shop can make, about the optimum of a search."""
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import replace
 from itertools import combinations, product
 
 import numpy as np
 
-from ..numerics import check, real
+from ..numerics import changed, check, real
 from .linear_model import LinearModel
 from .problem import Problem
 from .search import Record
@@ -22,7 +21,7 @@ Polish = Callable[[Problem, Record, np.ndarray], None]
 Cell = tuple[int, ...]  # of the grid: a multiple of every step
 
 
-def check_steps(owner: str, steps: Mapping[str, float], bounds: Mapping[str, tuple[float, float]]) -> dict[str, float]:
+def check_steps(steps: Mapping[str, float], bounds: Mapping[str, tuple[float, float]]) -> dict[str, float]:
     """Steps of the rounded variables, without those of 0.
 
     Raises:
@@ -30,12 +29,12 @@ def check_steps(owner: str, steps: Mapping[str, float], bounds: Mapping[str, tup
     """
     for name, step in steps.items():
         if name not in bounds:
-            raise ValueError(f'{owner}: "{name}" of rounding must be one of {", ".join(bounds)}')
-        check(owner, f"rounding of {name}", real(step), "", low=0.0)
+            raise ValueError(f'"{name}" of rounding must be one of {", ".join(bounds)}')
+        check(f"rounding of {name}", real(step), "", low=0.0)
         low, high = bounds[name]
         if step and not multiples(step, low, high):
             raise ValueError(
-                f"{owner}: rounding of {name} = {step:g} has no multiple from {low:g} to {high:g}; give a smaller step "
+                f"rounding of {name} = {step:g} has no multiple from {low:g} to {high:g}; give a smaller step "
                 "or 0 for none"
             )
     return {name: float(step) for name, step in steps.items() if step}
@@ -153,7 +152,7 @@ def _search_free(record: Record, grid: _Grid, polish: Polish) -> None:
         return
     low, high = np.array(problem.low), np.array(problem.high)
     low[grid.columns] = high[grid.columns] = grid.values(grid.cell(record.point))
-    fixed = record.on(replace(problem, low=real(low), high=real(high)))
+    fixed = record.on(changed(problem, low=real(low), high=real(high)))
     fixed.history = []
     polish(fixed.problem, fixed, record.point)
     record.evaluations = fixed.evaluations

@@ -1,8 +1,5 @@
-"""Base class of optimization methods, their record and start points, and true scores of many designs."""
+"""Record of a search, start points, and true scores of many designs."""
 
-from abc import abstractmethod
-
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -93,23 +90,6 @@ class Record:
         self.history.append((self.evaluations, value, self.problem.mesh.resolution.positions))
         if self._callback is not None:
             self._callback(step, steps, value)
-
-
-class AbstractMethod(eqx.Module):
-    """A method of optimization; its fields are its options."""
-
-    @property
-    @abstractmethod
-    def name(self) -> str:
-        """Name in design files and tables."""
-
-    @abstractmethod
-    def search(self, problem: Problem, record: Record) -> None:
-        """Searches, leaving the best design in the record."""
-
-    def polish(self, problem: Problem, record: Record, point: np.ndarray) -> None:
-        """Goes on from a design on a finer mesh; a method that follows no slopes just judges it there."""
-        record.judge(point[None])
 
 
 def start_points(problem: Problem, count: int) -> np.ndarray:

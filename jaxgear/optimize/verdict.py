@@ -292,7 +292,7 @@ def structure_for(mesh: Mesh, *, cache: str | Path | bool | None = True) -> Tabu
             meshed.
     """
     if isinstance(mesh.compliance, TabulatedCompliance):
-        raise ValueError("verify: mesh has the finite-element structure already, there is nothing to compare it with")
+        raise ValueError("mesh has the finite-element structure already, there is nothing to compare it with")
     return finite_element_compliance(mesh.pair, mesh.compliance.plane, cache=cache)
 
 

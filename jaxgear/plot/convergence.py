@@ -94,8 +94,8 @@ def iterations_relief(
         ValueError: for an optimum without iterations or another gear.
     """
     if gear not in ("pinion", "wheel"):
-        raise ValueError(f'iterations_relief: gear "{gear}" is not known, must be one of pinion, wheel')
-    states = _states("iterations_relief", optimum)
+        raise ValueError(f'gear "{gear}" is not known, must be one of pinion, wheel')
+    states = _states(optimum)
     path = _path(mesh, gear)
     with report_axes(ax) as ax:
         for index, state in enumerate(states):
@@ -121,7 +121,7 @@ def iterations_transmission_error(optimum: Optimum, phase: ArrayLike, ax: Axes |
     Raises:
         ValueError: for an optimum without iterations.
     """
-    states = _states("iterations_transmission_error", optimum)
+    states = _states(optimum)
     with report_axes(ax) as ax:
         for index, state in enumerate(states):
             label = _label(index, len(states), f"PPTE {float(state.ppte):.2f} µm")
@@ -131,9 +131,9 @@ def iterations_transmission_error(optimum: Optimum, phase: ArrayLike, ax: Axes |
     return ax
 
 
-def _states(owner: str, optimum: Optimum) -> tuple[Iterate, ...]:
+def _states(optimum: Optimum) -> tuple[Iterate, ...]:
     if not optimum.iterations:
-        raise ValueError(f"{owner}: optimum has no iterations, must be the result of a transmission-error iteration")
+        raise ValueError("optimum has no iterations, must be the result of a transmission-error iteration")
     return optimum.iterations
 
 

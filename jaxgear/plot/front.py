@@ -98,13 +98,13 @@ def pareto(table: Table[Of], ax: Axes | None = None, *, marked: Mapping[str, int
     Raises:
         ValueError: for other than two or three results, or no variant with finite values.
     """
-    values = columns_of("pareto", table, least=2)
+    values = columns_of(table, least=2)
     x, y, *third = table
     if len(third) > 1:
-        raise ValueError(f"pareto: table has {len(table)} columns, must have two or three")
+        raise ValueError(f"table has {len(table)} columns, must have two or three")
     front = pareto_front(costs(values, table))
     if not front.any():
-        raise ValueError("pareto: no variant has finite values in all columns")
+        raise ValueError("no variant has finite values in all columns")
     others = np.isfinite(values).all(axis=1) & ~front
     total = int(np.sum(others) + np.sum(front))
     with report_axes(ax) as ax:
@@ -190,7 +190,7 @@ def optimum_front(
     """
     count = len(front.values)
     if chosen is not None and not 0 <= chosen < count:
-        raise ValueError(f"optimum_front: chosen is {chosen}, must be a design of the front, 0 to {count - 1}")
+        raise ValueError(f"chosen is {chosen}, must be a design of the front, 0 to {count - 1}")
     labels = objective_labels(front.compromise.problem)
     with report_axes(ax) as ax:
         if len(labels) == 2:
@@ -240,12 +240,12 @@ def parallel_coordinates(
     Raises:
         ValueError: for less than two columns, a colour that is none of them, or no variant with finite values.
     """
-    values = columns_of("parallel_coordinates", table, least=2)
+    values = columns_of(table, least=2)
     if colour_by not in table:
-        raise ValueError(f"parallel_coordinates: colour_by {colour_by.words} is not a column of the table")
+        raise ValueError(f"colour_by {colour_by.words} is not a column of the table")
     rows = np.flatnonzero(np.isfinite(values).all(axis=1))
     if rows.size == 0:
-        raise ValueError("parallel_coordinates: no variant has finite values in all columns")
+        raise ValueError("no variant has finite values in all columns")
     colour = values[:, list(table).index(colour_by)]
     rank = rows[np.argsort(colour_by.sign * colour[rows], kind="stable")]
     cloud = subsample(rank, shown)[::-1]  # the better ones over the worse ones

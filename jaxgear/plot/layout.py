@@ -64,14 +64,14 @@ def radar(
     Raises:
         ValueError: for less than three results, or a value that is not finite.
     """
-    values = columns_of("radar", table, least=3)
+    values = columns_of(table, least=3)
     rows = np.arange(len(values)) if variants is None else np.asarray(variants, int)
     names = [f"variant {row}" for row in rows] if names is None else names
     values = values[rows]
     if len(names) != len(rows) or len(rows) == 0:
-        raise ValueError(f"radar: names has {len(names)} entries, must have one for each of {len(rows)} variants")
+        raise ValueError(f"names has {len(names)} entries, must have one for each of {len(rows)} variants")
     for row, column in np.argwhere(~np.isfinite(values))[:1]:
-        raise ValueError(f"radar: {list(table)[column].words} of {names[row]} is {values[row, column]}, must be finite")
+        raise ValueError(f"{list(table)[column].words} of {names[row]} is {values[row, column]}, must be finite")
     radii = _radii(costs(values, table))
     texts = _texts(values, [(of.words, printed_unit(of.unit)) for of in table])
     if ax is not None:

@@ -37,18 +37,18 @@ Of = TypeVar("Of", bound=Quantity | Column)
 Table = Mapping[Of, ArrayLike]  # of every variant, by what the number is; `SweepTable.values` gives one
 
 
-def columns_of(owner: str, table: Table[Of], *, least: int = 1) -> np.ndarray:
+def columns_of(table: Table[Of], *, least: int = 1) -> np.ndarray:
     """Columns of a table side by side as floats, shape (variants, columns).
 
     Raises:
         ValueError: for columns of different lengths or too few of them.
     """
     if len(table) < least:
-        raise ValueError(f"{owner}: table has {len(table)} columns, must have at least {least}")
+        raise ValueError(f"table has {len(table)} columns, must have at least {least}")
     columns = [np.asarray(values, float) for values in table.values()]
     if len({column.shape for column in columns}) > 1 or columns[0].ndim != 1 or columns[0].size == 0:
         shapes = ", ".join(f"{of.words} {column.shape}" for of, column in zip(table, columns))
-        raise ValueError(f"{owner}: columns must be lists of the same length and not empty, not {shapes}")
+        raise ValueError(f"columns must be lists of the same length and not empty, not {shapes}")
     return np.stack(columns, axis=1)
 
 
@@ -227,7 +227,7 @@ def ppte_distribution(
     Raises:
         ValueError: for an unknown name.
     """
-    quantity = quantity_of(of, "ppte_distribution")
+    quantity = quantity_of(of)
     unit = printed_unit(quantity.unit)
     with report_axes(ax) as ax:
         for index, name, given in styled(samples):

@@ -33,7 +33,7 @@ def worn_flank(life: WearHistory, gear: Literal["pinion", "wheel"], ax: Axes | N
         ValueError: for another gear.
     """
     if gear not in _GEARS:
-        raise ValueError(f'worn_flank: gear = {gear!r} must be "pinion" or "wheel"')
+        raise ValueError(f'gear = {gear!r} must be "pinion" or "wheel"')
     number = _GEARS.index(gear)
     depths = np.asarray((life.pinion_depth, life.wheel_depth)[number])
     line = int(depths[-1].max(axis=-1).argmax())
@@ -63,7 +63,7 @@ def wear_history(
             function of a cycle.
         ax: Axes to draw into; None for a new figure.
     """
-    known = quantity_of(quantity, "wear_history")
+    known = quantity_of(quantity)
     with report_axes(ax) as ax:
         for index, name, life in styled(of):
             values = wear_depth(life) if quantity == "wear_depth" else over_life(life, known)

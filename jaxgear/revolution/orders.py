@@ -40,13 +40,13 @@ def shaft_orders(
     Raises:
         ValueError: for other revolutions or gears, and for more orders than the positions resolve.
     """
-    turns = whole_revolutions(revolution, gear, "shaft_orders")
+    turns = whole_revolutions(revolution, gear)
     curve = revolution.transmission_error if of is None else of
     places = curve.shape[-1]
     most = (places // 2 - 1) // turns
     if count is None:
         count = min(7 * revolution.teeth[GEARS.index(gear)] // 2, most)
-    whole("shaft_orders", "count", count, high=most)
+    whole("count", count, high=most)
     lines = jnp.fft.rfft(curve)[..., turns : (count + 1) * turns : turns] * (2 / places)
     squared = lines.real**2 + lines.imag**2
     present = squared > 0
@@ -67,16 +67,16 @@ def side_bands(
     Raises:
         ValueError: as `shaft_orders`, and for more side bands.
     """
-    whole("side_bands", "harmonic", harmonic)
+    whole("harmonic", harmonic)
     orders = np.asarray(side_band_orders(revolution, gear, harmonic, count))
     return shaft_orders(revolution, gear, int(orders[-1])).amplitude[..., orders - 1]
 
 
 def side_band_orders(revolution: Revolution, gear: GearName, harmonic: int = 1, count: int = _SIDE_BANDS) -> list[int]:
     """The orders of `side_bands`, ascending."""
-    whole_revolutions(revolution, gear, "side_bands")
+    whole_revolutions(revolution, gear)
     teeth = revolution.teeth[GEARS.index(gear)]
-    whole("side_bands", "count", count, high=(teeth - 1) // 2)
+    whole("count", count, high=(teeth - 1) // 2)
     middle = harmonic * teeth
     return [middle + away for away in range(-count, count + 1) if away]
 
@@ -169,7 +169,7 @@ def tooth_shares(revolution: Revolution, gear: GearName) -> Float[Array, "*batch
         ValueError: for no such gear.
     """
     if gear not in GEARS:
-        raise ValueError(f'tooth_shares: gear = {gear!r} must be "pinion" or "wheel"')
+        raise ValueError(f'gear = {gear!r} must be "pinion" or "wheel"')
     share, teeth = revolution.pair_share, revolution.teeth[GEARS.index(gear)]
     tooth = (revolution.first_pair + np.arange(share.shape[-1])) % teeth
     largest = jnp.moveaxis(jax.ops.segment_max(jnp.moveaxis(share, -1, 0), tooth, teeth), 0, -1)
@@ -178,4 +178,4 @@ def tooth_shares(revolution: Revolution, gear: GearName) -> Float[Array, "*batch
 
 def over_revolution(revolution: Revolution, of: str | Quantity) -> Float[Array, "*batch windows"]:
     """A quantity of mesh cycles, a name or a `Quantity`, in every window, shape (windows,)."""
-    return MESH_QUANTITIES.quantity_of(of, "over_revolution")(revolution.cycles)
+    return MESH_QUANTITIES.quantity_of(of)(revolution.cycles)

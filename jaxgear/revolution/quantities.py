@@ -63,11 +63,11 @@ def number_of(name: str, revolution: Revolution) -> Scalar:
 
 def _number(name: str, analysis: Analysis, teeth: Teeth) -> Scalar:
     # all quantities of the same teeth come from one revolution
-    return number_of(name, analysis.once(teeth, "revolution", lambda: _revolution(name, analysis, teeth)))
+    return number_of(name, analysis.once(teeth, "revolution", lambda: _revolution(analysis, teeth)))
 
 
-def _revolution(name: str, analysis: Analysis, teeth: Teeth) -> Revolution:
-    return solve_revolution(analysis.mesh_for(name), analysis.operating_point, teeth, **analysis.flanks)
+def _revolution(analysis: Analysis, teeth: Teeth) -> Revolution:
+    return solve_revolution(analysis.prepared_mesh, analysis.operating_point, teeth, **analysis.flanks)
 
 
 def _quantity(name: str, unit: str, meaning: str, **options: Any) -> Quantity:

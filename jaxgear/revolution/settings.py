@@ -49,7 +49,7 @@ class Teeth(AbstractSettings):
             if of is not None and not isinstance(of, TeethDeviations):
                 raise TypeError(f"Teeth: {name} is a {type(of).__name__}, must be of TeethDeviations")
         if isinstance(self.over, int) and not isinstance(self.over, bool):
-            whole("Teeth", "over", self.over, high=MOST_WINDOWS)
+            whole("Teeth: over", self.over, high=MOST_WINDOWS)
         elif self.over is not None and self.over not in _OVER:
             raise ValueError(
                 f'Teeth: over = {self.over!r} must be "pinion", "wheel", "hunting" or a number of base pitches'

@@ -145,12 +145,12 @@ def solve_revolution(
         TypeError: for something else than a prepared mesh, settings of teeth or a modification.
         ValueError: for deviations of another number of teeth, and as `solve`.
     """
-    check_mesh("solve_revolution", mesh)
+    check_mesh(mesh)
     if not isinstance(teeth, Teeth):
-        raise TypeError(f"solve_revolution: teeth is a {type(teeth).__name__}, must be of Teeth")
-    operating_point = operating_point_of("solve_revolution", torque, mesh.slice_width.dtype)
-    check_torque("solve_revolution", mesh.support_torque, operating_point.torque)
-    flanks = flanks_of("solve_revolution", mesh, pinion, wheel)
+        raise TypeError(f"teeth is a {type(teeth).__name__}, must be of Teeth")
+    operating_point = operating_point_of(torque, mesh.slice_width.dtype)
+    check_torque(mesh.support_torque, operating_point.torque)
+    flanks = flanks_of(mesh, pinion, wheel)
     _check_slices(mesh, teeth)
     counts = teeth.counts_of(mesh.pair)
     windows = teeth.windows(counts)
@@ -172,7 +172,7 @@ def _check_slices(mesh: Mesh, teeth: Teeth) -> None:
             flank = jax.tree.map(lambda leaf, tooth=tooth: jnp.asarray(leaf)[tooth], of.flanks)
             if any(term.varies_along_face for term in terms(flank)):
                 raise ValueError(
-                    f"solve_revolution: flanks of the {name} vary along the face, which a mesh of 1 slice cannot show: "
+                    f"flanks of the {name} vary along the face, which a mesh of 1 slice cannot show: "
                     "prepare with Resolution(slices=11)"
                 )
 
@@ -262,18 +262,18 @@ def _status(mesh: Mesh, cycle: MeshCycle, removed: Any, pitch: Array) -> Array:
     return status_of({Status.MORE_PAIRS_NEEDED: near & cycle.converged}, cycle.status)
 
 
-def whole_revolutions(revolution: Revolution, gear: GearName, owner: str) -> int:
+def whole_revolutions(revolution: Revolution, gear: GearName) -> int:
     """Revolutions of a gear in the windows.
 
     Raises:
         ValueError: where it makes no whole number of them, so that it has no orders, or there is no such gear.
     """
     if gear not in GEARS:
-        raise ValueError(f'{owner}: gear = {gear!r} must be "pinion" or "wheel"')
+        raise ValueError(f'gear = {gear!r} must be "pinion" or "wheel"')
     teeth, windows = revolution.teeth[GEARS.index(gear)], revolution.windows
     if windows % teeth or not revolution.repeats:
         raise ValueError(
-            f"{owner}: {windows} base pitches are no whole revolutions of all gears whose teeth differ, or of the "
+            f"{windows} base pitches are no whole revolutions of all gears whose teeth differ, or of the "
             f'{gear} ({teeth} teeth): solve over "hunting"'
         )
     return windows // teeth

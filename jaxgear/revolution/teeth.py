@@ -147,7 +147,7 @@ class TeethDeviations(Checked):
         known, unit = concrete(single), "TeethDeviations: single pitch deviations"
         if single.ndim != 1:
             raise ValueError(f"{unit} have shape {single.shape}, must be a list of numbers, one per tooth")
-        check("TeethDeviations", "single pitch deviations", single, "um")
+        check("TeethDeviations: single pitch deviations", single, "um")
         allowed = _ROUNDED * np.sqrt(single.shape[0])
         if known is not None and abs(known.sum()) > allowed:
             raise ValueError(

@@ -85,7 +85,7 @@ class MatrixBearing(AbstractBearing):
         known = concrete(self.stiffness)
         if known is None:
             return
-        check_symmetric(f'MatrixBearing "{self.name}"', "stiffness", known)
+        check_symmetric(f'MatrixBearing "{self.name}": stiffness', known)
         least, most = np.linalg.eigvalsh(known)[[0, -1]]
         if least < -ROUNDING * most:
             raise ValueError(

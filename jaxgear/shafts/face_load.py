@@ -66,7 +66,7 @@ def face_load_factor(line_load: Float[Array, "... slices"], slice_width: Slices 
         slice_width: width of every slice [mm]; None where all are equal.
     """
     load = real(line_load)
-    check("face_load_factor", "slice_width", slice_width, "mm", low=0.0, open_low=True)
+    check("slice_width", slice_width, "mm", low=0.0, open_low=True)
     given = jnp.ones_like(load[..., :1]) if slice_width is None else real(slice_width)
     return _largest_over_mean(load, given)
 
@@ -87,9 +87,9 @@ def root_face_load_factor(factor: Given, face_width: Given, tooth_height: Given)
         face_width: b [mm], the smaller of the two gears.
         tooth_height: h from root to tip [mm], of the gear with the larger h/b; h/b counts as 1/3 at most.
     """
-    check("root_face_load_factor", "factor", factor, "", low=_LEVEL)
-    check("root_face_load_factor", "face_width", face_width, "mm", low=0.0, open_low=True)
-    check("root_face_load_factor", "tooth_height", tooth_height, "mm", low=0.0, open_low=True)
+    check("factor", factor, "", low=_LEVEL)
+    check("face_width", face_width, "mm", low=0.0, open_low=True)
+    check("tooth_height", tooth_height, "mm", low=0.0, open_low=True)
     return jnp.maximum(real(factor), 1.0) ** root_exponent(real(face_width), real(tooth_height))
 
 
@@ -150,12 +150,12 @@ def annex_e(
     of_gearbox = isinstance(support, ShaftSupport)
     if (torque is None) != of_gearbox:
         problem = "has no effect: that of the couplings counts" if of_gearbox else "must be given: no coupling has one"
-        raise ValueError(f"annex_e: torque {problem}")
-    check("annex_e", "torque", torque, "N m", low=0.0)
-    check("annex_e", "stiffness", stiffness, "N/(mm um)", low=0.0, open_low=True)
+        raise ValueError(f"torque {problem}")
+    check("torque", torque, "N m", low=0.0)
+    check("stiffness", stiffness, "N/(mm um)", low=0.0, open_low=True)
     modified = NoModification() if pinion is None else pinion, NoModification() if wheel is None else wheel
     optional = None if torque is None else real(torque), None if stiffness is None else real(stiffness)
-    removed = _removed(support.pair, *modified, whole("annex_e", "stations", stations, 2, 1001))
+    removed = _removed(support.pair, *modified, whole("stations", stations, 2, 1001))
     return _annex_e(support, removed, *optional)
 
 

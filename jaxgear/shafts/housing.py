@@ -78,7 +78,7 @@ class Housing(Checked):
             raise ValueError(f"Housing: matrix has shape {self.matrix.shape}, must be ({size}, {size}) as its nodes")
         known = concrete(self.matrix)
         if known is not None:
-            check_symmetric("Housing", self.kind, known, self.nodes)
+            check_symmetric(f"Housing: {self.kind}", known, self.nodes)
             _check_definite(known, self.kind, self.nodes)
 
     @property
@@ -291,7 +291,7 @@ def spread_forces(
     rows = np.asarray(degrees_of_freedom)
     if rows.shape != (count, 3) or rows.min() < 0 or rows.max() >= size:
         raise ValueError(
-            f"spread_forces: degrees_of_freedom of shape {rows.shape} must be {count} times 3 rows from 0 to "
+            f"degrees_of_freedom of shape {rows.shape} must be {count} times 3 rows from 0 to "
             f"{size - 1}: the nodes of a seat must be free"
         )
     # resultant of nodal forces: x, y, z and moments about the centre
@@ -310,7 +310,7 @@ def spread_forces(
     gram = resultant @ resultant.T
     scale = 1 / np.sqrt(np.maximum(np.diag(gram), np.finfo(float).tiny))
     if np.linalg.matrix_rank(scale[:, None] * gram * scale) < 6:
-        raise ValueError(f"spread_forces: {count} nodes cannot carry forces and moments: they lie on one line")
+        raise ValueError(f"{count} nodes cannot carry forces and moments: they lie on one line")
     spread = resultant.T @ np.linalg.inv(gram)
     ways = 5 if tilting else 3
     forces = np.zeros((size, ways))
@@ -333,18 +333,16 @@ def condense(
     """
     matrix = scipy.sparse.csc_matrix(stiffness)
     if matrix.shape[0] != matrix.shape[1] or abs(matrix - matrix.T).max() > _ASYMMETRY * abs(matrix).max():
-        raise ValueError(
-            f"condense: stiffness of shape {matrix.shape} must be square and symmetric, both of its triangles given"
-        )
+        raise ValueError(f"stiffness of shape {matrix.shape} must be square and symmetric, both of its triangles given")
     nodes: list[str] = []
     for name, forces in seats.items():
         if forces.ndim != 2 or forces.shape[0] != matrix.shape[0] or forces.shape[1] not in (3, 5):
             raise ValueError(
-                f'condense: seat "{name}" has nodal forces of shape {forces.shape}, must be ({matrix.shape[0]}, 3 or 5)'
+                f'seat "{name}" has nodal forces of shape {forces.shape}, must be ({matrix.shape[0]}, 3 or 5)'
             )
         nodes += [f"{name}.{way}" for way in DIRECTIONS[: forces.shape[1]]]
     if not nodes:
-        raise ValueError("condense: seats must not be empty")
+        raise ValueError("seats must not be empty")
     loads = np.concatenate(list(seats.values()), axis=1)
     try:
         with threadpool_limits(limits=1):  # many small blocks: threads only get in each other's way
@@ -353,11 +351,11 @@ def condense(
             )
             moved = factors.solve(loads)
     except RuntimeError:  # exactly singular
-        raise ValueError("condense: stiffness is singular: is the housing fixed to its foundation?") from None
+        raise ValueError("stiffness is singular: is the housing fixed to its foundation?") from None
     missed = np.abs(matrix @ moved - loads).max() / np.abs(loads).max()
     if not missed < _MISSED:  # a model that floats is singular but for rounding
         raise ValueError(
-            f"condense: stiffness is singular, residual forces are {missed:.2g} of the given ones: is the housing "
+            f"stiffness is singular, residual forces are {missed:.2g} of the given ones: is the housing "
             "fixed to its foundation?"
         )
     compliance = loads.T @ moved  # mm and rad per N and N mm

@@ -68,12 +68,12 @@ def iso_shaft_deflection(
     """
     values = {"line_load": (line_load, "N/mm"), "offset": (offset, "mm")}
     for name, (value, unit) in values.items():
-        check("iso_shaft_deflection", name, value, unit, low=0.0)
+        check(name, value, unit, low=0.0)
     sizes = {"face_width": face_width, "pitch_diameter": pitch_diameter, "shaft_diameter": shaft_diameter, "span": span}
     for name, value in sizes.items():
-        check("iso_shaft_deflection", name, value, "mm", low=0.0, open_low=True)
-    check("iso_shaft_deflection", "power_share", power_share, "%", low=0.0, high=100.0, open_low=True)
-    _check_choice("iso_shaft_deflection", "arrangement", arrangement, _ARRANGEMENTS)
+        check(name, value, "mm", low=0.0, open_low=True)
+    check("power_share", power_share, "%", low=0.0, high=100.0, open_low=True)
+    _check_choice("arrangement", arrangement, _ARRANGEMENTS)
     ratio = real(pitch_diameter) / real(shaft_diameter)
     stiffened, plain = _ARRANGEMENTS[arrangement]
     lever = jnp.where(ratio >= _STIFFENED, stiffened, plain)
@@ -112,15 +112,15 @@ def method_c(
         ValueError: for an unknown choice, through-hardened flanks without their endurance limit, or a number out of its
             range.
     """
-    check("method_c", "line_load", line_load, "N/mm", low=0.0, open_low=True)
-    check("method_c", "stiffness", stiffness, "N/(mm um)", low=0.0, open_low=True)
+    check("line_load", line_load, "N/mm", low=0.0, open_low=True)
+    check("stiffness", stiffness, "N/(mm um)", low=0.0, open_low=True)
     for name, value in (
         ("shaft_deflection", shaft_deflection),
         ("misalignment", misalignment),
         ("helix_tolerance", helix_tolerance),
     ):
-        check("method_c", name, value, "um", low=0.0)
-    _check_choice("method_c", "flank_line", flank_line, _EFFECTS)
+        check(name, value, "um", low=0.0)
+    _check_choice("flank_line", flank_line, _EFFECTS)
     first, second = _EFFECTS[flank_line]
     least = jnp.maximum(_LEAST_PER_LOAD * real(line_load), 0.5 * real(helix_tolerance))
     initial = jnp.maximum(1.33 * first * real(shaft_deflection) + second * real(misalignment), least)
@@ -132,19 +132,19 @@ def method_c(
 
 def _running_in(initial: Scalar, hardening: Hardening, endurance_limit: Given | None) -> Scalar:
     """y_beta [um]."""
-    _check_choice("method_c", "hardening", hardening, get_args(Hardening))
+    _check_choice("hardening", hardening, get_args(Hardening))
     if endurance_limit is not None and hardening != "through_hardened":
-        raise ValueError(f'method_c: endurance_limit has no effect on hardening = "{hardening}"')
+        raise ValueError(f'endurance_limit has no effect on hardening = "{hardening}"')
     if hardening == "surface_hardened":
         return jnp.minimum(_RUN_IN * initial, _RUN_IN_MOST)
     if hardening == "cast_iron":
         return _RUN_IN_CAST * initial
     if endurance_limit is None:
-        raise ValueError("method_c: through-hardened flanks need endurance_limit, sigma_Hlim in MPa")
-    check("method_c", "endurance_limit", endurance_limit, "MPa", low=_RUN_IN_SOFT)
+        raise ValueError("through-hardened flanks need endurance_limit, sigma_Hlim in MPa")
+    check("endurance_limit", endurance_limit, "MPa", low=_RUN_IN_SOFT)
     return _RUN_IN_SOFT / real(endurance_limit) * initial
 
 
-def _check_choice(owner: str, name: str, value: str, choices: Collection[str]) -> None:
+def _check_choice(name: str, value: str, choices: Collection[str]) -> None:
     if value not in choices:
-        raise ValueError(f"{owner}: {name} = {value!r} must be one of {', '.join(choices)}")
+        raise ValueError(f"{name} = {value!r} must be one of {', '.join(choices)}")

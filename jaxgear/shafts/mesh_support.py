@@ -75,7 +75,7 @@ class TabulatedSupport(AbstractSupport):
         if known is not None:
             if known.shape[0] != known.shape[1]:
                 raise ValueError(f"TabulatedSupport: matrix is {known.shape[0]} x {known.shape[1]}, must be square")
-            check_symmetric("TabulatedSupport", "matrix", known)
+            check_symmetric("TabulatedSupport: matrix", known)
             values = np.linalg.eigvalsh(symmetric(known))
             if values[0] < -ROUNDING * values[-1]:
                 raise ValueError(
@@ -141,7 +141,7 @@ class ShaftSupport(AbstractSupport):
     def check_together(self) -> None:
         if not self.gearbox.meshes:
             raise ValueError("ShaftSupport: gearbox has no mesh")
-        whole("ShaftSupport", "mesh", self.mesh, 0, len(self.gearbox.meshes) - 1)
+        whole("ShaftSupport: mesh", self.mesh, 0, len(self.gearbox.meshes) - 1)
 
     @property
     def pair(self) -> GearPair:

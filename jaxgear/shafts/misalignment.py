@@ -67,8 +67,8 @@ def axis_tolerance(helix_deviation: Given, face_width: Given, bearing_span: Give
         face_width: b [mm].
         bearing_span: L [mm].
     """
-    check("axis_tolerance", "helix_deviation", helix_deviation, "um", low=0.0)
-    check("axis_tolerance", "face_width", face_width, "mm", low=0.0, open_low=True)
+    check("helix_deviation", helix_deviation, "um", low=0.0)
+    check("face_width", face_width, "mm", low=0.0, open_low=True)
     bearings = real(bearing_span, "Misalignment: bearing_span")
     skew = _SKEW * bearings / real(face_width) * real(helix_deviation)
     return Misalignment(skew, _INCLINATION * skew, bearings)

@@ -70,7 +70,7 @@ def with_and_without_housing(gearbox: Gearbox) -> tuple[BearingReactions, Bearin
         ValueError: for a gearbox without a housing.
     """
     if gearbox.housing is None:
-        raise ValueError("with_and_without_housing: gearbox has no housing")
+        raise ValueError("gearbox has no housing")
     return _reactions(gearbox), _reactions(replace(gearbox, housing=None))
 
 
@@ -87,10 +87,10 @@ def elastic_line(gearbox: Gearbox, shaft: str, position: Numbers) -> ElasticLine
     """
     names = [item.name for item in gearbox.shafts]
     if shaft not in names:
-        raise ValueError(f'elastic_line: shaft "{shaft}" is not known, must be one of {", ".join(names)}')
+        raise ValueError(f'shaft "{shaft}" is not known, must be one of {", ".join(names)}')
     end = concrete(gearbox.shafts[names.index(shaft)].length)
     farthest = None if end is None else float(end) * _ROUNDED
-    check("elastic_line", "position", position, "mm", low=0.0, high=farthest)
+    check("position", position, "mm", low=0.0, high=farthest)
     return _line(gearbox, names.index(shaft), jnp.atleast_1d(real(position)))
 
 

@@ -43,7 +43,7 @@ def semidefinite(matrix: Float[Array, "n n"]) -> Bool[Array, ""]:
     return positive_definite(lifted)
 
 
-def check_symmetric(owner: str, name: str, matrix: np.ndarray, labels: Sequence[str] | None = None) -> None:
+def check_symmetric(name: str, matrix: np.ndarray, labels: Sequence[str] | None = None) -> None:
     """Raises a one-line `ValueError` that names the entry that differs most from its mirror image."""
     scale = np.sqrt(np.abs(np.diag(matrix)))
     size = np.maximum(np.outer(scale, scale), np.finfo(float).tiny)
@@ -53,7 +53,7 @@ def check_symmetric(owner: str, name: str, matrix: np.ndarray, labels: Sequence[
         return
     first, second = (row, column) if labels is None else (labels[int(row)], labels[int(column)])
     raise ValueError(
-        f"{owner}: {name} must be symmetric, but ({first}, {second}) = {matrix[row, column]:.6g} and "
+        f"{name} must be symmetric, but ({first}, {second}) = {matrix[row, column]:.6g} and "
         f"({second}, {first}) = {matrix[column, row]:.6g}"
     )
 

@@ -30,8 +30,8 @@ def equivalent_misalignment(helix_tolerance: Given, shaft_deflection: Given) -> 
         helix_tolerance: f_Hbeta, helix slope tolerance [um].
         shaft_deflection: f_sh, misalignment by elastic deflections of shafts and gears [um over the face width].
     """
-    check("equivalent_misalignment", "helix_tolerance", helix_tolerance, "um", low=0.0)
-    check("equivalent_misalignment", "shaft_deflection", shaft_deflection, "um", low=0.0)
+    check("helix_tolerance", helix_tolerance, "um", low=0.0)
+    check("shaft_deflection", shaft_deflection, "um", low=0.0)
     return real(shaft_deflection) + 1.5 * real(helix_tolerance)
 
 
@@ -42,7 +42,7 @@ def crowning_for_misalignment(misalignment: Given, *, limited: bool = False) -> 
         misalignment: F_betax [um over the face width], for example `equivalent_misalignment`.
         limited: whether to keep to the range of the annex, 10 to 40 um.
     """
-    check("crowning_for_misalignment", "misalignment", misalignment, "um", low=0.0)
+    check("misalignment", misalignment, "um", low=0.0)
     amount = 0.5 * real(misalignment)
     return jnp.clip(amount, *_CROWNING) if limited else amount
 
@@ -57,7 +57,7 @@ def crowning_for_tolerance(helix_tolerance: Given, *, limited: bool = False) -> 
         helix_tolerance: f_Hbeta, helix slope tolerance [um].
         limited: whether to keep to the range of the annex, 10 to 25 um.
     """
-    check("crowning_for_tolerance", "helix_tolerance", helix_tolerance, "um", low=0.0)
+    check("helix_tolerance", helix_tolerance, "um", low=0.0)
     amount = real(helix_tolerance)
     return jnp.clip(amount, *_STIFF_CROWNING) if limited else amount
 
@@ -103,7 +103,7 @@ def end_relief_amount(
         return 0.5 * whole
     if kind == "stiff":
         return real(helix_tolerance)
-    raise ValueError(f'end_relief_amount: kind = {kind!r} must be "through_hardened", "surface_hardened" or "stiff"')
+    raise ValueError(f'kind = {kind!r} must be "through_hardened", "surface_hardened" or "stiff"')
 
 
 def end_relief_length(pair: GearPair) -> Scalar:

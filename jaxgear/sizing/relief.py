@@ -42,7 +42,7 @@ def relief_amount(pair: GearPair, torque: Given, application_factor: Given = 1.0
         torque: on the pinion [N m].
         application_factor: K_A.
     """
-    line_load = _line_load("relief_amount", pair, torque, application_factor)
+    line_load = _line_load(pair, torque, application_factor)
     return _over(line_load, iso_stiffness(pair, line_load).single)
 
 
@@ -60,8 +60,8 @@ def effective_relief(
         application_factor: K_A.
         mesh_load_factor: K_mp, uneven sharing between several meshes.
     """
-    check("effective_relief", "mesh_load_factor", mesh_load_factor, "", low=0.0)
-    line_load = _line_load("effective_relief", pair, torque, application_factor)
+    check("mesh_load_factor", mesh_load_factor, "", low=0.0)
+    line_load = _line_load(pair, torque, application_factor)
     normal = line_load * real(mesh_load_factor) / jnp.cos(pair.pinion.transverse_pressure_angle)
     return _over(normal, iso_stiffness(pair, line_load).mesh)
 
@@ -79,7 +79,7 @@ def mesh_stiffness_relief(pair: GearPair, torque: Given, application_factor: Giv
         torque: on the pinion [N m].
         application_factor: K_A.
     """
-    line_load = _line_load("mesh_stiffness_relief", pair, torque, application_factor)
+    line_load = _line_load(pair, torque, application_factor)
     return _over(line_load, path_of_contact(pair).contact_ratio * iso_stiffness(pair, line_load).mesh)
 
 
@@ -92,7 +92,7 @@ def run_in_relief(hertz_limit: Given) -> Scalar:
     Args:
         hertz_limit: allowable contact stress number sigma_Hlim of the softer flank's material [MPa].
     """
-    check("run_in_relief", "hertz_limit", hertz_limit, "MPa", low=0.0, open_low=True)
+    check("hertz_limit", hertz_limit, "MPa", low=0.0, open_low=True)
     return (real(hertz_limit) / 97.0 - 18.45) ** 2 / 18.0 + 1.5
 
 
@@ -108,8 +108,8 @@ def dynamic_relief(cycle: MeshCycle, internal_force: Given = 0.0, external_force
         internal_force: F_ah, amplitude from the transmission error on the line of action [N].
         external_force: F_aT, amplitude of the fluctuation of the load on the line of action [N].
     """
-    check("dynamic_relief", "internal_force", internal_force, "N", low=0.0)
-    check("dynamic_relief", "external_force", external_force, "N", low=0.0)
+    check("internal_force", internal_force, "N", low=0.0)
+    check("external_force", external_force, "N", low=0.0)
     stiffness = secant_stiffness(cycle)
     return safe_divide(cycle.force + real(internal_force) + real(external_force), minimum(stiffness))
 
@@ -122,10 +122,10 @@ def iso_relief(
     return TipRelief(relief_amount(pair, torque, application_factor), long_relief_length(pair), **shape)
 
 
-def _line_load(owner: str, pair: GearPair, torque: Given, application_factor: Given) -> Scalar:
+def _line_load(pair: GearPair, torque: Given, application_factor: Given) -> Scalar:
     """F_t K_A / b [N/mm], tangential at the reference circle."""
-    check(owner, "torque", torque, "N m", low=0.0)
-    check(owner, "application_factor", application_factor, "", low=0.0)
+    check("torque", torque, "N m", low=0.0)
+    check("application_factor", application_factor, "", low=0.0)
     tangential = 1e3 * real(torque) * real(application_factor) / pair.pinion.pitch_radius
     return tangential / pair.face_width
 

@@ -11,7 +11,7 @@ from .comparison_result import ComparisonResult as ComparisonResult
 from .dynamics import DynamicsStudy as DynamicsStudy
 from .dynamics_result import DynamicsResult as DynamicsResult
 from .evaluation import Evaluation as Evaluation
-from .evaluation import evaluate as evaluate
+from .evaluation import evaluation_of as evaluation_of
 from .export import ExportResult as ExportResult
 from .export import ExportStudy as ExportStudy
 from .identification import IdentificationResult as IdentificationResult

@@ -12,7 +12,6 @@ from ..compliance import Compliance, TabulatedCompliance
 from ..contact import Mesh
 from ..io import DesignFile, DesignFileError, Search
 from ..io.errors import naming
-from ..io.tolerance_table import tolerance_of
 from ..microgeometry import AbstractModification, NoModification
 from ..optimize import (
     Front,
@@ -25,12 +24,12 @@ from ..optimize import (
     structure_for,
     verification,
 )
-from ..tolerance import Tolerance
+from ..tolerance import ManufacturedGears
 from . import manufactured, side_by_side
 from .checkpoints import Checkpoints
 from .comparison import Modifications, rule_based
 from .comparison_result import ComparisonResult
-from .evaluation import Evaluation, coarse, evaluate, torques_of
+from .evaluation import Evaluation, coarse, evaluation_of, torques_of
 from .optimum_report import COMPROMISE
 from .progress import Stages
 from .study import AbstractStudy
@@ -91,7 +90,7 @@ class ComparisonRun:
     def evaluate(self, name: str, pinion: AbstractModification, wheel: AbstractModification) -> None:
         """Evaluates a design and keeps it."""
         self._stages.begin(f"solving the {name} design")
-        found = evaluate(self.design, self._mesh, self._torques, pinion, wheel)
+        found = evaluation_of(self.design, self._mesh, self._torques, pinion, wheel)
         if self._problem is not None:
             found = dataclasses.replace(found, objectives=judged(self._problem, pinion, wheel))
         self._evaluations[name] = found
@@ -132,13 +131,13 @@ class ComparisonRun:
             found = by_finite_elements(claimed.cycle, claimed.objectives, claimed.pinion, claimed.wheel)
             self._evaluations[name] = dataclasses.replace(claimed, verified=found)
 
-    def result(self, tolerance: Tolerance | None) -> ComparisonResult:
-        """Result of the comparison, with the scatter of all designs within a tolerance; None for nominal gears only."""
+    def result(self, gears: ManufacturedGears | None) -> ComparisonResult:
+        """Result of the comparison, with the scatter of all designs; None for nominal gears only."""
         evaluations = self._evaluations
-        if tolerance is not None:
+        if gears is not None:
             self._stages.begin("manufacturing the designs within their tolerances")
             of = self.design, self._mesh, evaluations
-            evaluations = manufactured.scattered(*of, tolerance, quick=self._quick)
+            evaluations = manufactured.scattered(*of, gears)
         return ComparisonResult(
             self.design,
             self._quick,
@@ -159,14 +158,14 @@ class AnalysisStudy(AbstractStudy[ComparisonResult]):
     """Analyze the unmodified pair and the modification of the design file.
 
     Attributes:
-        tolerance: of manufactured gears; None without the table [tolerance].
+        gears: manufactured gears; None without the table [tolerance].
     """
 
     name: ClassVar = "analyze"
     takes_coast: ClassVar = True
     coarse: ClassVar = ""
 
-    tolerance: Tolerance | None
+    gears: ManufacturedGears | None
 
     @classmethod
     def of(cls, design: DesignFile, *, quick: bool = False) -> Self:
@@ -177,7 +176,7 @@ class AnalysisStudy(AbstractStudy[ComparisonResult]):
             problem = f"analyze needs numbers, these are free: {', '.join(free)}; {says}"
             raise DesignFileError("variables", problem, design.path)
         with naming(design.path):
-            return cls(design, quick, tolerance_of(design))
+            return cls(design, quick, manufactured.gears_of(design, quick=quick))
 
     def omits(self) -> str:
         """Nothing."""
@@ -191,7 +190,7 @@ class AnalysisStudy(AbstractStudy[ComparisonResult]):
         pinion, wheel = self.design.design(self.design.values)
         if not (isinstance(pinion, NoModification) and isinstance(wheel, NoModification)):
             run.evaluate("modified", pinion, wheel)
-        return run.result(self.tolerance)
+        return run.result(self.gears)
 
 
 @dataclass(frozen=True)
@@ -203,7 +202,7 @@ class OptimizationStudy(AbstractStudy[ComparisonResult]):
 
     Attributes:
         search: search for the optimum.
-        tolerance: of manufactured gears; None without the table [tolerance].
+        gears: manufactured gears; None without the table [tolerance].
     """
 
     name: ClassVar = "optimize"
@@ -212,14 +211,14 @@ class OptimizationStudy(AbstractStudy[ComparisonResult]):
     needs: ClassVar = ("scipy.optimize",)
 
     search: Search
-    tolerance: Tolerance | None
+    gears: ManufacturedGears | None
 
     @classmethod
     def of(cls, design: DesignFile, *, quick: bool = False, method: str | None = None) -> Self:
         """Optimization of a design file, see `AbstractStudy.of`; `method` replaces that of the file."""
         search = Search.of(design, method=method, quick=quick)
         with naming(design.path):
-            return cls(design, quick, search, tolerance_of(design))
+            return cls(design, quick, search, manufactured.gears_of(design, quick=quick))
 
     @property
     def folder(self) -> str:
@@ -236,4 +235,4 @@ class OptimizationStudy(AbstractStudy[ComparisonResult]):
         run.prepare(finer=self.search.finer, verify=self.search.verify)
         relief, involute = rule_based(self.design), NoModification()
         run.search(self.search, {"unmodified": (involute, involute), "rule-based": (relief, relief)})
-        return run.result(self.tolerance)
+        return run.result(self.gears)

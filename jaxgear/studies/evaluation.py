@@ -84,7 +84,7 @@ def torques_of(design: DesignFile, *, quick: bool) -> np.ndarray:
     return np.linspace(*design.torque_range, _QUICK_TORQUES if quick else _TORQUES)
 
 
-def evaluate(
+def evaluation_of(
     file: DesignFile, mesh: Mesh, torques: np.ndarray, pinion: AbstractModification, wheel: AbstractModification
 ) -> Evaluation:
     """Evaluates a design at the torque of its file and at further ones [N m]."""

@@ -100,9 +100,9 @@ class IdentificationStudy(AbstractStudy["IdentificationResult"]):
             pitch: True if single pitch deviations of all teeth are unknowns, within f_pT of the class of their gear.
         """
         for name, given in (("torque-scale", torque_scale), ("offset", offset)):
-            check("identify", name, given, "um" if name == "offset" else "", low=0.0)
+            check(name, given, "um" if name == "offset" else "", low=0.0)
         if noise is not None:
-            check("identify", "noise", noise, "um", low=0.0, open_low=True)
+            check("noise", noise, "um", low=0.0, open_low=True)
         if not design.bounds:
             raise DesignFileError("variables", "missing; identify looks for the values of variables", design.path)
         for free in design.open_case:
@@ -121,7 +121,7 @@ class IdentificationStudy(AbstractStudy["IdentificationResult"]):
         try:
             data.noise_on(sizes, period_of(data, design.pair(), pitches, offset or None))
         except ValueError as error:
-            says = str(error).removeprefix("identify: ")
+            says = str(error)
             key, help_ = next((key, help_) for begin, key, help_ in _HELP if says.startswith(begin))
             raise DesignFileError(key, says.removeprefix(f"{key} ") + help_, study.measured) from None
         return study
@@ -145,17 +145,17 @@ class IdentificationStudy(AbstractStudy["IdentificationResult"]):
         stages.begin("searching the variables")
         try:
             found = identify(
+                mesh,
+                self.measurement,
                 _Flanks(self.design.design),
                 self.prior,
-                self.measurement,
-                mesh=mesh,
                 torque_scale=self.torque_scale or None,
                 offset=self.offset or None,
                 single_pitch=self.single_pitch,
                 candidates=self._further(),
             )
         except ValueError as error:
-            raise DesignFileError("variables", str(error).removeprefix("identify: "), self.design.path) from None
+            raise DesignFileError("variables", str(error), self.design.path) from None
         return IdentificationResult(self.design, self.measured, mesh, self.prior, found)
 
 

@@ -19,8 +19,8 @@ from ..layout import (
     at_stations,
     at_torque,
     face_load_over_torques,
-    findings_of,
     flank_line_contact,
+    layout_findings,
     layout_flank_lines,
     vary_profiles,
     without_housing,
@@ -130,7 +130,7 @@ class LayoutStudy(AbstractStudy[LayoutResult]):
                 slices_change = {which: face_change(cycle, between[which]) for which, cycle in cycles.items()}
         duty_cycle = self.options.get("duty_cycle")
         unusual = {
-            name: findings_of(
+            name: layout_findings(
                 layout,
                 self.supports[name],
                 duty_cycle=duty_cycle,

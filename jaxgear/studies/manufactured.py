@@ -8,9 +8,10 @@ import numpy as np
 
 from ..contact import Mesh
 from ..io import DesignFile
+from ..io.tolerance_table import manufactured_of
 from ..report import Chapter, Table
 from ..sweeps import Scatter, monte_carlo
-from ..tolerance import Tolerance
+from ..tolerance import ManufacturedGears
 from .evaluation import Evaluation
 from .side_by_side import Evaluations, main
 
@@ -18,14 +19,12 @@ _QUICK_PAIRS = 16
 
 
 def scattered(
-    design: DesignFile, mesh: Mesh, evaluations: Evaluations, tolerance: Tolerance, *, quick: bool
+    design: DesignFile, mesh: Mesh, evaluations: Evaluations, gears: ManufacturedGears
 ) -> dict[str, Evaluation]:
-    """The evaluations with their scatter within a tolerance; all designs meet the same gears."""
-    options: dict[str, Any] = {"tolerance": tolerance, **drawn(design, quick=quick)}
+    """The evaluations with their scatter over manufactured gears, the same for all designs."""
+    of = mesh, design.torque, gears
     return {
-        name: replace(
-            found, scatter=monte_carlo(mesh, design.torque, pinion=found.pinion, wheel=found.wheel, **options)
-        )
+        name: replace(found, scatter=monte_carlo(*of, pinion=found.pinion, wheel=found.wheel))
         for name, found in evaluations.items()
     }
 
@@ -106,10 +105,9 @@ def _pairs(design: DesignFile, scatter: Scatter) -> str:
     return pairs_in_words(design, scatter.ppte.shape[0])
 
 
-def drawn(design: DesignFile, *, quick: bool) -> dict[str, int]:
-    """How many manufactured pairs a design is judged by, and the seed of their deviations."""
-    asked = design.tables["tolerance"]
-    return {"samples": min(asked.samples, _QUICK_PAIRS) if quick else asked.samples, "seed": asked.seed}
+def gears_of(design: DesignFile, *, quick: bool) -> ManufacturedGears | None:
+    """The manufactured pairs that a design is judged by; None without the table [tolerance]."""
+    return manufactured_of(design, _QUICK_PAIRS if quick else None)
 
 
 def left_out(design: DesignFile, why: str = "") -> str:

@@ -78,7 +78,8 @@ class SweepStudy(AbstractStudy[SweepResult]):
             _check(self.output)
         stages.count(0, None, "preparing")
         meter, output = _Meter(stages), None if self.output is None else self.output / TABLE
-        table = sweep(design.design, mesh=design.sweep_mesh(size), output=output, callback=meter, **options)
+        load, plan = options.pop("load"), options.pop("plan")
+        table = sweep(design.sweep_mesh(size), load, design.design, plan, output=output, callback=meter, **options)
         if jax.process_index() > 0:  # the first process speaks for all
             return SweepResult(design, self.quick, self.output, size, table, table.take([]), (), (), meter.rate)
         chosen = table.best(self.best)

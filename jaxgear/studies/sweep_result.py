@@ -17,7 +17,7 @@ from ..report import Chapter, Table, figure, text, write_variants, write_workboo
 from ..sweeps import SweepTable
 from . import side_by_side
 from .comparison import Modifications
-from .evaluation import evaluate, torques_of
+from .evaluation import evaluation_of, torques_of
 from .results import save_figures
 from .study import AbstractStudyResult
 from .summary_data import sizes
@@ -128,7 +128,7 @@ class SweepResult(AbstractStudyResult):
         first = self.best.take(range(min(CHOSEN, len(self.best))))
         for number, parameters in reversed([*zip(first.column("variant"), first.designs())]):
             designs[f"variant {number}"] = design.design(parameters)
-        found = {name: evaluate(design, mesh, torques, *flanks) for name, flanks in designs.items()}
+        found = {name: evaluation_of(design, mesh, torques, *flanks) for name, flanks in designs.items()}
         report = SweepReport(**given, mesh=mesh, evaluations=found, torques=torques)
         return dataclasses.replace(report, pages=report.alone(folder)) if figures else report
 

@@ -8,9 +8,8 @@ from typing import Any, ClassVar, Self
 from ..contact import Mesh, OperatingPoint
 from ..io import DesignFile, Search
 from ..io.errors import naming
-from ..io.tolerance_table import tolerance_of
 from ..numerics import optional_real, real
-from ..tolerance import Tolerance
+from ..tolerance import ManufacturedGears
 from ..wear import Wear, WearHistory
 from . import manufactured, wear_scatter
 from .checkpoints import Checkpoints, CheckpointsOfKind, Marches, NamedArrays
@@ -43,21 +42,21 @@ class WearStudy(AbstractStudy[WearResult]):
     settings: Wear
     search: Search | None
     over_life: Search | None
-    tolerance: Tolerance | None
+    gears: ManufacturedGears | None
 
     @classmethod
     def of(cls, design: DesignFile, *, quick: bool = False) -> Self:
         """Wear study of a design file, see `AbstractStudy.of`."""
         with naming(design.path):
             settings = design.needed("wear", "it says for how long the pair runs and how it wears").settings(design)
-            tolerance = None if wear_scatter.left_out(design) else tolerance_of(design)
+            gears = None if wear_scatter.left_out(design) else manufactured.gears_of(design, quick=quick)
         if quick:
             settings = dataclasses.replace(settings, blocks=_QUICK_BLOCKS, largest_increment=None)
         search = search_of(design, quick=quick)
         # a step of the search wears a life: under the static load, which takes far less than a motion in every block
         static = dataclasses.replace(settings, line_load=None, dynamics=None)
         over_life = None if search is None else search.over_life(static)
-        return cls(design, quick, settings, search, over_life, tolerance)
+        return cls(design, quick, settings, search, over_life, gears)
 
     def omits(self) -> str:
         """Manufactured gears under the dynamic line load."""
@@ -75,19 +74,13 @@ class WearStudy(AbstractStudy[WearResult]):
         kept = checkpoints.of(Marches())
         histories = {name: self._life(mesh, name, flanks, kept, stages) for name, flanks in designs.items()}
         scatters: Mapping[str, wear_scatter.Samples] = {}
-        if self.tolerance is not None:
+        if self.gears is not None:
             stages.begin("wear of manufactured gears of all designs")
             # of one length, as quantities take them, and as many as the nominal gears have taken
             blocks = min(max(len(history.revolutions) - 1 for history in histories.values()), _MOST_BLOCKS)
             settings = dataclasses.replace(self.settings, blocks=blocks, largest_increment=None)
             scatters = wear_scatter.manufactured_wear(
-                settings,
-                mesh,
-                design.torque,
-                designs,
-                self.tolerance,
-                **manufactured.drawn(design, quick=quick),
-                keep=checkpoints.of(NamedArrays()),
+                mesh, design.torque, designs, settings, self.gears, keep=checkpoints.of(NamedArrays())
             )
         return WearResult(design, self.settings, designs, histories, scatters)
 
@@ -98,8 +91,8 @@ class WearStudy(AbstractStudy[WearResult]):
         stages.begin(f"wear of the {name} design")
         design, (pinion, wheel) = self.design, flanks
 
-        def progress(done: float, total: float) -> None:
-            stages.count(int(done), int(total), f"{done:.3g} of {total:.3g} revolutions")
+        def progress(done: int, total: int, best: float | None) -> None:
+            stages.count(done, total, f"{done:.3g} of {total:.3g} revolutions")
 
         load = None
         if self.settings.loads is None:

@@ -13,7 +13,7 @@ from ..io import DesignFile
 from ..microgeometry import AbstractModification
 from ..numerics import Quantile, program, real
 from ..report import Table
-from ..tolerance import Tolerance
+from ..tolerance import ManufacturedGears
 from ..wear import WEAR_QUANTITIES, Wear
 from ..wear.quantities import MOST_LIVES, number_of
 from . import manufactured
@@ -39,26 +39,22 @@ def left_out(design: DesignFile) -> str:
 
 
 def manufactured_wear(
-    settings: Wear,
     mesh: Mesh,
     torque: Loads,
     designs: Mapping[str, tuple[AbstractModification, AbstractModification]],
-    tolerance: Tolerance,
+    settings: Wear,
+    manufactured: ManufacturedGears,
     *,
-    samples: int,
-    seed: int = 0,
     keep: Callable[[Any, Callable[[], Samples]], Samples] | None = None,
 ) -> dict[str, Samples]:
     """Wears manufactured pairs of several designs; all designs meet the same gears.
 
     Args:
-        settings: of the wear, under the static line load.
         mesh: prepared mesh.
         torque: on the pinion [N m]; has no effect where the settings have torques of their own.
         designs: modifications of pinion and wheel by name.
-        tolerance: of the gears.
-        samples: manufactured pairs.
-        seed: of their deviations.
+        settings: settings of the wear, under the static line load.
+        manufactured: manufactured gears.
         keep: checkpoints of arrays by name, one per design; None keeps nothing.
 
     Returns:
@@ -67,7 +63,7 @@ def manufactured_wear(
     Raises:
         ValueError: as `jaxgear.monte_carlo`.
     """
-    cases = conditions("manufactured_wear", mesh, torque, tolerance=tolerance, samples=samples, seed=seed).on(mesh)
+    cases = conditions(mesh, torque, manufactured).on(mesh)
     assert cases.removed is not None
     kept = Checkpoints().of(NamedArrays()) if keep is None else keep
     names, load, removed = tuple(asked(settings)), cases.torque[0], cases.removed[0]

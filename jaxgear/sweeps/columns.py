@@ -152,7 +152,7 @@ def parameter_columns(plan: AbstractPlan, units: Mapping[str, str], taken: Seque
     """
     for name in plan.names:
         if name in taken or name in (VARIANT, CONVERGED, STATUS):
-            raise ValueError(f'sweep: parameter "{name}" has the name of another column of the table')
+            raise ValueError(f'parameter "{name}" has the name of another column of the table')
     limits = zip(plan.names, plan.low, plan.high)
     return [Column(described(name, units.get(name, "")), "parameter", low=low, high=high) for name, low, high in limits]
 
@@ -174,7 +174,7 @@ def result_columns(
         ValueError: for no or repeated results.
     """
     if not results or len({of.key for of in results}) != len(results):
-        raise ValueError("sweep: results must be different and at least one")
+        raise ValueError("results must be different and at least one")
     joins = [label(measure) for measure in measures] or [""]
     gears = joins if conditions.samples > 1 else [""]
     load = conditions.load

@@ -14,7 +14,7 @@ from ..contact import Mesh, removed_material, solve_removed
 from ..metrics import AbstractSettings, Analysis, Quantity, share_settings
 from ..microgeometry import AbstractModification, NoModification
 from ..numerics import AbstractMeasure, Checked, Given, Quantile, Worst, check, kernel, real, result, whole
-from ..tolerance import Tolerance
+from ..tolerance import ManufacturedGears
 from ..tolerance.deviation import deviation_field, deviation_of, flank_basis
 from ..tolerance.limits import check_slices
 from ..vocabulary import quantity_of
@@ -66,7 +66,7 @@ class Scatter(Checked):
         Raises:
             ValueError: for a result that was not asked for.
         """
-        wanted = quantity_of(of, "Scatter")
+        wanted = quantity_of(of)
         known = {"ppte_um": self.ppte, **self.numbers}
         if wanted.key not in known:
             raise ValueError(f'Scatter: "{wanted.key}" is not among the results, must be one of {", ".join(known)}')
@@ -96,12 +96,10 @@ class Scatter(Checked):
 def monte_carlo(
     mesh: Mesh,
     torque: Given,
+    manufactured: ManufacturedGears,
     *,
-    tolerance: Tolerance,
     pinion: AbstractModification | None = None,
     wheel: AbstractModification | None = None,
-    samples: int = 100_000,
-    seed: int = 0,
     quantiles: Sequence[float] = (0.05, 0.25, 0.5, 0.75, 0.95),
     results: Sequence[str | Quantity] = (),
 ) -> Scatter:
@@ -109,9 +107,9 @@ def monte_carlo(
 
     Runs in blocks on all local devices; one compilation serves every tolerance, torque, seed and amount of
     modification. Beyond the blocks it holds one transmission error curve per sample in memory. For gradients, average
-    over `sample_deviations` yourself:
+    over the deviations yourself:
 
-        deviations = jg.tolerance.sample_deviations(tolerance, mesh, 500, seed=0)
+        deviations = jg.ManufacturedGears(tolerance, samples=500).on(mesh)
 
         def mean_ppte(amount):
             def one(deviation):
@@ -123,11 +121,9 @@ def monte_carlo(
     Args:
         mesh: prepared mesh.
         torque: on the pinion [N m], scalar.
-        tolerance: limits and distribution of the deviations.
+        manufactured: manufactured gears, at least 2.
         pinion: modification of the pinion flank; None for the nominal involute.
         wheel: modification of the wheel flank; None for the nominal involute.
-        samples: how many, at least 2.
-        seed: of the random numbers; sample i is that of `sample_deviations` with the same seed.
         quantiles: levels of the transmission error curves, between 0 and 1.
         results: further quantities, as for `sweep`.
 
@@ -135,14 +131,14 @@ def monte_carlo(
         ValueError: for a torque, a number of samples or a quantile outside its range, unknown results, or lead
             deviations on a mesh of one slice.
     """
-    check("monte_carlo", "torque", torque, "N m", low=0.0)
+    check("torque", torque, "N m", low=0.0)
     levels = np.sort(np.asarray(quantiles, float))
-    check("monte_carlo", "quantiles", levels, "", low=0.0, high=1.0)
-    whole("monte_carlo", "samples", samples, 2)
-    check_slices("monte_carlo", tolerance, mesh)
-    wanted, settings = share_settings([quantity_of(of, "monte_carlo") for of in results])
+    check("quantiles", levels, "", low=0.0, high=1.0)
+    samples, tolerance = whole("samples", manufactured.samples, 2), manufactured.tolerance
+    check_slices(tolerance, mesh)
+    wanted, settings = share_settings([quantity_of(of) for of in results])
     flanks = pinion or NoModification(), wheel or NoModification()
-    task = (mesh, real(torque), tolerance, *flanks, jax.random.key(seed))
+    task = (mesh, real(torque), tolerance, *flanks, jax.random.key(manufactured.seed))
     curves, converged, numbers = _run(task, wanted, settings, samples + 1)
     return _scatter(mesh.phase, curves, converged, levels, {of.key: column for of, column in zip(wanted, numbers)})
 

@@ -70,14 +70,14 @@ class FullFactorial(AbstractPlan):
         Raises:
             ValueError: for wrong bounds, missing or unknown parameters, and levels outside the bounds.
         """
-        names, low, high = box("FullFactorial", bounds)
+        names, low, high = box(bounds)
         each = {name: levels for name in names} if isinstance(levels, int) else dict(levels)
         if set(each) != set(names):
             odd = sorted(set(each) ^ set(names))
             raise ValueError(f"FullFactorial: levels must be given for {', '.join(names)} ({', '.join(odd)} differ)")
         values = tuple(_levels(name, each[name], *bounds[name]) for name in names)
         size = math.prod(len(value) for value in values)
-        super().__init__(names, low, high, whole("FullFactorial", "number of combinations", size))
+        super().__init__(names, low, high, whole("FullFactorial: number of combinations", size))
         self.levels = values
 
     def _rows(self, start, stop):
@@ -133,7 +133,7 @@ class VariantList(AbstractPlan):
         return {"sampling": "list", "names": list(self.names), "sha256": digest.hexdigest()}
 
 
-def box(owner: str, bounds: Bounds) -> tuple[tuple[str, ...], tuple[float, ...], tuple[float, ...]]:
+def box(bounds: Bounds) -> tuple[tuple[str, ...], tuple[float, ...], tuple[float, ...]]:
     """Names, lower and upper bounds, checked.
 
     Raises:
@@ -141,15 +141,15 @@ def box(owner: str, bounds: Bounds) -> tuple[tuple[str, ...], tuple[float, ...],
     """
     if not isinstance(bounds, Mapping):
         kind = type(bounds).__name__
-        raise ValueError(f'{owner}: bounds is a {kind}, must be a dict such as {{"amount": (0.0, 20.0)}}')
+        raise ValueError(f'bounds is a {kind}, must be a dict such as {{"amount": (0.0, 20.0)}}')
     if not bounds:
-        raise ValueError(f"{owner}: bounds must name at least one parameter")
+        raise ValueError("bounds must name at least one parameter")
     for name, ends in bounds.items():
         if np.shape(ends) != (2,):
-            raise ValueError(f"{owner}: bounds of {name} = {ends!r} must be two numbers, (low, high)")
+            raise ValueError(f"bounds of {name} = {ends!r} must be two numbers, (low, high)")
         low, high = ends
-        check(owner, f"lower bound of {name}", low, "")
-        check(owner, f"upper bound of {name}", high, "", low=low, open_low=True)
+        check(f"lower bound of {name}", low, "")
+        check(f"upper bound of {name}", high, "", low=low, open_low=True)
     return tuple(bounds), tuple(low for low, _ in bounds.values()), tuple(high for _, high in bounds.values())
 
 
@@ -159,11 +159,11 @@ def _finite(values: np.ndarray) -> np.ndarray:
 
 def _levels(name: str, given, low: float, high: float) -> np.ndarray:
     if isinstance(given, int | np.integer):
-        return np.linspace(low, high, whole("FullFactorial", f"levels of {name}", given, low=2))
+        return np.linspace(low, high, whole(f"FullFactorial: levels of {name}", given, low=2))
     values = np.asarray(given, np.float64)
     if values.ndim != 1 or not len(values) or len(np.unique(values)) != len(values):
         raise ValueError(f"FullFactorial: levels of {name} must be a count or a list of different values")
-    check("FullFactorial", f"levels of {name}", values, "", low=low, high=high)
+    check(f"FullFactorial: levels of {name}", values, "", low=low, high=high)
     return values
 
 
@@ -188,9 +188,8 @@ class _Sampling(AbstractPlan):
         Raises:
             ValueError: for wrong bounds, samples or seed.
         """
-        owner = type(self).__name__
-        super().__init__(*box(owner, bounds), whole(owner, "samples", samples))
-        self.seed = whole(owner, "seed", seed, low=0)
+        super().__init__(*box(bounds), whole("samples", samples))
+        self.seed = whole("seed", seed, low=0)
 
     @abstractmethod
     def _points(self, start: int, stop: int) -> np.ndarray:

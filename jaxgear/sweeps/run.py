@@ -21,7 +21,7 @@ from ..contact.operating_point import Torque
 from ..metrics import Analysis, Quantity, share_settings
 from ..numerics import AbstractMeasure, Callback, Mean, Quantile, Worst, whole
 from ..numerics.durable import digest
-from ..tolerance import Tolerance
+from ..tolerance import ManufacturedGears
 from ..version import version
 from ..vocabulary import quantities, quantity_of
 from .columns import CAUSE, FLAG, NUMBER, Column, parameter_columns
@@ -38,17 +38,15 @@ _POLL = 0.2  # seconds between two looks for the parts of other processes
 
 
 def sweep(
-    design: Design,
-    plan: AbstractPlan,
     mesh: Mesh | Callable[[Parameters], Mesh],
     torque: Loads | Callable[[Parameters], Torque],
+    design: Design,
+    plan: AbstractPlan,
     *,
     results: Sequence[str | Quantity] = ("ppte",),
     measures: Sequence[AbstractMeasure] | None = None,
     output: str | Path | None = None,
-    tolerance: Tolerance | None = None,
-    samples: int | None = None,
-    seed: int = 0,
+    manufactured: ManufacturedGears | None = None,
     part_rows: int | None = None,
     title: str = "sweep",
     units: Mapping[str, str] | None = None,
@@ -68,24 +66,22 @@ def sweep(
     functions of them as `mesh` and `torque` they are also the macro geometry and the load:
 
         jg.sweep(
+            lambda v: jg.prepare(pair_of(v["shift"]), resolution=jg.Resolution(positions=32)),
+            lambda v: v["torque"],
             lambda v: (jg.TipRelief(v["amount"], 4.0), None),
             plan,
-            mesh=lambda v: jg.prepare(pair_of(v["shift"]), resolution=jg.Resolution(positions=32)),
-            torque=lambda v: v["torque"],
         )
 
     Args:
+        mesh: prepared mesh; or a function of the named variables that prepares one, traced.
+        torque: on the pinion [N m], a `LoadSpectrum`, or a function of the named variables that gives a torque.
         design: makes (pinion, wheel) modifications from the named variables; traced, so it must be pure.
         plan: the variants: `FullFactorial`, `LatinHypercube`, `Sobol` or `VariantList`.
-        mesh: prepared mesh; or a function of the named variables that prepares one, traced likewise.
-        torque: on the pinion [N m], a `LoadSpectrum`, or a function of the named variables that gives a torque.
         results: names of `metrics.quantities`, or quantities of your own; only these are computed.
         measures: by which torques and manufactured gears are joined, a column each; None for `Mean()` and `Worst()` of
-            several torques, with a tolerance `Mean()` and `Quantile(0.95)`.
+            several torques, with manufactured gears `Mean()` and `Quantile(0.95)`.
         output: folder of the table; None keeps it in memory.
-        tolerance: evaluates every variant with the same manufactured gears; None for the nominal design.
-        samples: manufactured gears; None for 64 with a tolerance.
-        seed: of the deviations.
+        manufactured: manufactured gears, the same for every variant; None for nominal gears.
         part_rows: variants per file, of which an interruption costs those under way; None for 64 files of at most
             131072 variants and at least as many as the devices evaluate at once, or for those of the sweep that is
             resumed. The rows do not depend on it.
@@ -105,25 +101,15 @@ def sweep(
             folder that cannot be used or holds a sweep of other settings.
     """
     if part_rows is not None:
-        whole("sweep", "part_rows", part_rows)
+        whole("part_rows", part_rows)
     if not isinstance(plan, AbstractPlan):
         kind = type(plan).__name__
-        raise TypeError(f"sweep: plan is a {kind}, must be FullFactorial, LatinHypercube, Sobol or VariantList")
+        raise TypeError(f"plan is a {kind}, must be FullFactorial, LatinHypercube, Sobol or VariantList")
     example = plan.rows(0, 1)[0]
-    made = variants(
-        "sweep",
-        design,
-        mesh,
-        torque,
-        names=plan.names,
-        values=example,
-        tolerance=tolerance,
-        samples=samples,
-        seed=seed,
-    )
+    made = variants(mesh, torque, design, names=plan.names, values=example, manufactured=manufactured)
     traced, used = made.traced(jnp.asarray(example))
-    check_used("sweep", plan.names, used)
-    wanted = [quantity_of(of, "sweep") for of in results]
+    check_used(plan.names, used)
+    wanted = [quantity_of(of) for of in results]
     joins = _measures(made.conditions, measures)
     few = plan.size * made.conditions.count <= FEW
     if part_rows is None:
@@ -137,13 +123,17 @@ def sweep(
         "variants": plan.size,
         "part_rows": part_rows,
         "tolerance": None
-        if tolerance is None
-        else {"limits": _digest(tolerance), "samples": made.conditions.samples, "seed": seed},
+        if manufactured is None
+        else {
+            "limits": _digest(manufactured.tolerance),
+            "samples": manufactured.samples,
+            "seed": manufactured.seed,
+        },
     }
     manifest = Manifest(title, tuple(columns), settings)
     if output is None:
         if jax.process_count() > 1:
-            raise ValueError("sweep: output = None cannot gather the rows of several processes, name a shared folder")
+            raise ValueError("output = None cannot gather the rows of several processes, name a shared folder")
         store, tables = Store("", manifest), []
         all_missing = dict.fromkeys(range(store.parts), True)
         _run(evaluator, plan, store, all_missing, lambda *part: tables.append(store.table(*part)), callback)
@@ -231,10 +221,10 @@ def _measures(conditions: Conditions, given: Sequence[AbstractMeasure] | None) -
             return Mean(), Quantile()
         return (Mean(), Worst()) if conditions.count > 1 else ()
     if conditions.count == 1:
-        raise ValueError("sweep: measures have no effect: one torque and nominal gears are a single case")
+        raise ValueError("measures have no effect: one torque and nominal gears are a single case")
     names = [label(measure) for measure in given]
     if not names or len(set(names)) != len(names):
-        raise ValueError(f"sweep: measures {', '.join(names) or '(none)'} must be different and at least one")
+        raise ValueError(f"measures {', '.join(names) or '(none)'} must be different and at least one")
     return tuple(given)
 
 

@@ -7,8 +7,8 @@ slope, so that each deviation is what a gear measuring machine reports under tha
 
 from .deviation import Deviation as Deviation
 from .deviation import GearDeviation as GearDeviation
+from .deviation import ManufacturedGears as ManufacturedGears
 from .deviation import deviated_material as deviated_material
-from .deviation import sample_deviations as sample_deviations
 from .limits import AbstractDistribution as AbstractDistribution
 from .limits import GearTolerance as GearTolerance
 from .limits import Tolerance as Tolerance

@@ -14,7 +14,8 @@ from ..contact import Mesh, RemovedMaterial, removed_material
 from ..contact.operating_point import Torque, operating_point_of
 from ..contact.slide import nominal_material
 from ..microgeometry import AbstractModification, Flank, LeadSlope, NoModification, ProfileSlope
-from ..numerics import Checked, number, program, real, result, spread, whole
+from ..numerics import Checked, number, program, real, result, spread
+from ..numerics.fields import count
 from .limits import AbstractDistribution, GearTolerance, Tolerance, check_slices
 
 Real = Float[Array, "*samples"]
@@ -42,7 +43,7 @@ class GearDeviation(Checked):
 
 
 class Deviation(Checked):
-    """Deviations of a gear pair, made by `sample_deviations`; a leading axis for several samples.
+    """Deviations of a gear pair, made by `ManufacturedGears`; a leading axis for several samples.
 
     Attributes:
         pinion, wheel: deviations of the two gears.
@@ -76,31 +77,37 @@ class Waviness(AbstractModification):
         return jnp.sum(waves * self.coefficients.astype(waves.dtype).reshape((1,) * x.ndim + (-1,)), axis=-1)
 
 
-def sample_deviations(tolerance: Tolerance, mesh: Mesh, samples: int, seed: int) -> Deviation:
-    """Random deviations of manufactured gears within a tolerance.
+class ManufacturedGears(Checked):
+    """Pairs of manufactured gears within a tolerance, by which designs are judged.
 
     Sample i depends on the seed and on i alone, not on the number of samples, and is a smooth function of the limits:
     the same seed gives common random numbers for every design and every tolerance.
 
-    Args:
-        tolerance: limits and distribution.
-        mesh: its number of pairs and its floating-point type count, nothing else.
-        samples: how many, at least 1.
-        seed: whole number.
-
-    Returns:
-        deviations with a leading axis (samples,).
-
-    Raises:
-        ValueError: for lead deviations on a mesh of one slice, or less than one sample.
+    Attributes:
+        tolerance: limits and distribution of the deviations.
+        samples: number of pairs.
+        seed: seed of the deviations.
     """
-    check_slices("sample_deviations", tolerance, mesh)
-    whole("sample_deviations", "samples", samples)
-    return _sample(tolerance, mesh, jax.random.key(seed), samples)
+
+    tolerance: Tolerance
+    samples: int = count(default=64)
+    seed: int = count(low=0, default=0)
+
+    def on(self, mesh: Mesh) -> Deviation:
+        """Random deviations of all pairs, with a leading axis (samples,).
+
+        Args:
+            mesh: prepared mesh; its number of pairs and its floating-point type count, nothing else.
+
+        Raises:
+            ValueError: for lead deviations on a mesh of one slice.
+        """
+        check_slices(self.tolerance, mesh)
+        return _sampled(self.tolerance, mesh, jax.random.key(self.seed), self.samples)
 
 
 @program
-def _sample(tolerance: Tolerance, mesh: Mesh, key: PRNGKeyArray, samples: int) -> Deviation:
+def _sampled(tolerance: Tolerance, mesh: Mesh, key: PRNGKeyArray, samples: int) -> Deviation:
     return jax.vmap(lambda number: deviation_of(tolerance, mesh, key, number))(jnp.arange(samples))
 
 
@@ -159,9 +166,7 @@ def flank_basis(mesh: Mesh, torque: Torque) -> Float[Array, "terms pairs slices 
 
     def removed(side: str, modification: AbstractModification) -> Load:
         flanks = {"pinion": NoModification(), "wheel": NoModification(), side: modification}
-        return nominal_material(
-            mesh, operating_point_of("flank_basis", torque, mesh.slice_width.dtype).torque, **flanks
-        )
+        return nominal_material(mesh, operating_point_of(torque, mesh.slice_width.dtype).torque, **flanks)
 
     def terms(side: str) -> Iterator[Array]:
         yield removed(side, ProfileSlope(unit))[None]

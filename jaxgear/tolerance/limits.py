@@ -72,7 +72,7 @@ class ToleranceClass(Checked):
     @classmethod
     def of(cls, gear: Gear, quality_class: Given) -> "ToleranceClass":
         """Tolerances of a gear of 5 to 1000 teeth."""
-        check("ToleranceClass", "teeth", gear.teeth, "", low=5.0, high=1000.0)
+        check("ToleranceClass: teeth", gear.teeth, "", low=5.0, high=1000.0)
         return cls(
             2 * gear.pitch_radius, gear.module, gear.face_width, real(quality_class, "ToleranceClass: quality_class")
         )
@@ -236,7 +236,7 @@ class Tolerance(Checked):
         )
 
 
-def check_slices(owner: str, tolerance: Tolerance, mesh: Mesh) -> None:
+def check_slices(tolerance: Tolerance, mesh: Mesh) -> None:
     """Raises a `ValueError` when the tolerance has lead deviations and the mesh has one slice, which cannot show them.
 
     A traced limit counts as one: its derivative would be zero.
@@ -253,6 +253,6 @@ def check_slices(owner: str, tolerance: Tolerance, mesh: Mesh) -> None:
             continue
         shown = "a traced limit" if known is None else f"{float(known.max()):g} um"
         raise ValueError(
-            f"{owner}: {name} = {shown} must be None or 0 um on a mesh of 1 slice, which cannot show it: prepare "
+            f"{name} = {shown} must be None or 0 um on a mesh of 1 slice, which cannot show it: prepare "
             "with Resolution(slices=5), or take tolerance.without_lead()"
         )

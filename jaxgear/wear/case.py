@@ -125,11 +125,11 @@ class OfLubrication(eqx.Module):
         found = self.of(*(jnp.where(loaded, field, 1.0) for field in given))
         both = found if isinstance(found, tuple | list) else (found, found)
         if len(both) != _GEARS:
-            raise ValueError(f"wear: coefficient gives {len(both)} values, must give one or a pair: pinion, wheel")
+            raise ValueError(f"coefficient gives {len(both)} values, must give one or a pair: pinion, wheel")
         fields = [jnp.asarray(field, pressure.dtype) for field in both]
         for field in fields:
             if jnp.broadcast_shapes(field.shape, shape) != shape:
-                raise ValueError(f"wear: coefficient gives an array of shape {field.shape}, must be {shape}")
+                raise ValueError(f"coefficient gives an array of shape {field.shape}, must be {shape}")
         return jnp.where(loaded, jnp.stack([jnp.broadcast_to(field, shape) for field in fields]), 0.0)
 
 
@@ -141,12 +141,12 @@ def wear_law(coefficient: Coefficient, loads: OperatingPoint, dtype: np.dtype) -
     """
     if callable(coefficient):
         if loads.speed is None:
-            raise ValueError("wear: coefficient is a function, which needs a speed: give OperatingPoint(torque, speed)")
+            raise ValueError("coefficient is a function, which needs a speed: give OperatingPoint(torque, speed)")
         return OfLubrication(coefficient)
     values = real(coefficient).astype(dtype)
     if values.shape not in ((), (_GEARS,)):
-        raise ValueError(f"wear: coefficient has shape {values.shape}, must be one number or a pair: pinion, wheel")
-    check("wear", "coefficient", values, "m2/N", low=0.0, high=LARGEST_COEFFICIENT)
+        raise ValueError(f"coefficient has shape {values.shape}, must be one number or a pair: pinion, wheel")
+    check("coefficient", values, "m2/N", low=0.0, high=LARGEST_COEFFICIENT)
     return Constant(jnp.broadcast_to(values, (_GEARS,))[:, None, None, None])
 
 
@@ -368,7 +368,6 @@ _marched, _marched_quickly = kernel(_march), program(_march)
 
 
 def case_of(
-    owner: str,
     mesh: Mesh,
     torque: Loads,
     *,
@@ -381,20 +380,20 @@ def case_of(
     line_load: LineLoad | None = None,
 ) -> Case:
     """Checks and collects what wears; arguments and errors as `wear`."""
-    check_mesh(owner, mesh)
-    pinion, wheel = flanks_of(owner, mesh, pinion, wheel)
+    check_mesh(mesh)
+    pinion, wheel = flanks_of(mesh, pinion, wheel)
     dtype = mesh.slice_width.dtype
-    loads, weights = _loads(owner, torque, dtype)
-    check_torque(owner, mesh.support_torque, loads.torque)
+    loads, weights = _loads(torque, dtype)
+    check_torque(mesh.support_torque, loads.torque)
     law = wear_law(coefficient, loads, dtype)
-    points = points_for(mesh.resolution.positions) if points is None else whole(owner, "points", points, low=3)
-    other = _deviation(owner, mesh, deviation)
+    points = points_for(mesh.resolution.positions) if points is None else whole("points", points, low=3)
+    other = _deviation(mesh, deviation)
     flanks = {"pinion": pinion, "wheel": wheel}
-    vibration = vibration_of(owner, mesh, loads, dynamics, line_load, flanks, None if deviation is None else other)
+    vibration = vibration_of(mesh, loads, dynamics, line_load, flanks, None if deviation is None else other)
     return Case(mesh, loads, weights, law, pinion, wheel, other, points, vibration)
 
 
-def _deviation(owner: str, mesh: Mesh, deviation: Numbers | None) -> Float[Array, "*shape"]:
+def _deviation(mesh: Mesh, deviation: Numbers | None) -> Float[Array, "*shape"]:
     """Material removed by manufacturing deviations [um]; zero where there are none."""
     if deviation is None:
         return jnp.zeros((), mesh.slice_width.dtype)
@@ -402,15 +401,15 @@ def _deviation(owner: str, mesh: Mesh, deviation: Numbers | None) -> Float[Array
     wanted = mesh.resolution.pairs, mesh.resolution.slices, mesh.resolution.positions
     if deviation.shape != wanted:
         shown = "(pairs, slices, positions)"
-        raise ValueError(f"{owner}: deviation has shape {deviation.shape}, must be {wanted} {shown}")
-    check(owner, "deviation", deviation, "um")
+        raise ValueError(f"deviation has shape {deviation.shape}, must be {wanted} {shown}")
+    check("deviation", deviation, "um")
     return deviation
 
 
-def _loads(owner: str, torque: Loads, dtype: np.dtype) -> tuple[OperatingPoint, Float[Array, " torques"] | None]:
+def _loads(torque: Loads, dtype: np.dtype) -> tuple[OperatingPoint, Float[Array, " torques"] | None]:
     """Operations with a leading axis (torques,), and the shares of a spectrum; None for a single load."""
     if not isinstance(torque, LoadSpectrum):
-        single = operating_point_of(owner, torque, dtype)
+        single = operating_point_of(torque, dtype)
         return jax.tree.map(lambda number: number[None], single), None
     load = jax.tree.map(lambda number: number.astype(dtype), torque)
     friction = None if load.friction is None else jnp.broadcast_to(load.friction, load.torques.shape)
@@ -418,8 +417,8 @@ def _loads(owner: str, torque: Loads, dtype: np.dtype) -> tuple[OperatingPoint, 
     def each(torque, speed, friction):
         return OperatingPoint(torque, speed, friction)
 
-    turns = load.turns(owner)
+    turns = load.turns()
     if load.duration is not None:
-        check(owner, "sum of hours times speeds", jnp.sum(turns), "", low=0.0, open_low=True)
+        check("sum of hours times speeds", jnp.sum(turns), "", low=0.0, open_low=True)
         turns = turns / jnp.sum(turns)
     return jax.vmap(each)(load.torques, load.speeds, friction), turns

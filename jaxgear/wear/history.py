@@ -14,7 +14,7 @@ from ..contact.status import WithStatus
 from ..dynamics import Dynamics
 from ..geometry import Gear
 from ..microgeometry import AbstractModification
-from ..numerics import Checked, Given, Numbers, check, maximum, program, quick_jit, real, result, whole
+from ..numerics import Callback, Checked, Given, Numbers, check, maximum, program, quick_jit, real, result, whole
 from .case import Case, Coefficient, case_of, marched, tables
 from .march import BLOCKS_OF_A_PAIR, Depth, March
 from .vibration import LineLoad
@@ -119,7 +119,7 @@ def wear(
     line_load: LineLoad | None = None,
     largest_increment: Given | None = None,
     keep: Keep | None = None,
-    callback: Callable[[float, float], None] | None = None,
+    callback: Callback | None = None,
 ) -> WearHistory:
     """Wear of both flanks, in blocks of revolutions: contact, wear, new flank, again.
 
@@ -162,7 +162,7 @@ def wear(
             below what the teeth deflect under their load.
         keep: called for every two blocks with all that they depend on and with what makes them; gives them, made now or
             before. None to make them all.
-        callback: called with the revolutions so far and all of them after every two blocks.
+        callback: called as callback(revolutions so far, all of them, None) after every two blocks.
 
     Returns:
         flanks and mesh at the start of every block and after the last one.
@@ -174,15 +174,15 @@ def wear(
             holds the gears, dynamics without a speed, a dynamic load without dynamics, and whatever `solve` and
             `mesh_force` refuse.
     """
-    check_blocks("wear", blocks)
+    check_blocks(blocks)
     flanks: dict[str, Any] = {"pinion": pinion, "wheel": wheel, "deviation": deviation}
     vibrating: dict[str, Any] = {"dynamics": dynamics, "line_load": line_load}
-    case = case_of("wear", mesh, torque, coefficient=coefficient, points=points, **flanks, **vibrating)
+    case = case_of(mesh, torque, coefficient=coefficient, points=points, **flanks, **vibrating)
     revolutions = real(revolutions).astype(mesh.slice_width.dtype)
     if revolutions.ndim:
-        raise ValueError(f"wear: revolutions has shape {revolutions.shape}, must be a single number")
-    check("wear", "revolutions", revolutions, "", low=0.0, open_low=True)
-    check("wear", "largest_increment", largest_increment, "um", low=0.0, open_low=True)
+        raise ValueError(f"revolutions has shape {revolutions.shape}, must be a single number")
+    check("revolutions", revolutions, "", low=0.0, open_low=True)
+    check("largest_increment", largest_increment, "um", low=0.0, open_low=True)
     if largest_increment is not None or keep is not None or callback is not None:
         limit = None if largest_increment is None else float(largest_increment)
         return _by_pairs(case, float(revolutions), blocks, limit, keep, callback)
@@ -191,10 +191,10 @@ def wear(
     return history_of(case, found, jnp.arange(blocks + 1, dtype=revolutions.dtype) / blocks * revolutions)
 
 
-def check_blocks(owner: str, blocks: int) -> None:
+def check_blocks(blocks: int) -> None:
     """Raises a one-line `ValueError` for something else than an even number of blocks."""
-    if whole(owner, "blocks", blocks, low=2) % BLOCKS_OF_A_PAIR:
-        raise ValueError(f"{owner}: blocks = {blocks} must be even: two and two are compared with one of double length")
+    if whole("blocks", blocks, low=2) % BLOCKS_OF_A_PAIR:
+        raise ValueError(f"blocks = {blocks} must be even: two and two are compared with one of double length")
 
 
 @program
@@ -266,7 +266,7 @@ def _by_pairs(case: Case, total: float, blocks: int, limit: float | None, keep, 
         depth = pair.depth[-1]
         found.append(pair)
         if callback is not None:
-            callback(done, total)
+            callback(int(done), int(total), None)
     return history_of(case, _together(found), jnp.asarray(at, depth.dtype))
 
 

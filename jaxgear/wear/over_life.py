@@ -33,13 +33,11 @@ def over_life(history: WearHistory, of: Measured, measure: AbstractMeasure | Non
     Raises:
         ValueError: for an unknown name, and for the dynamic factor of a life without dynamics.
     """
-    _single("over_life", history)
-    quantity = _quantity_of(of, "over_life")
+    _single(history)
+    quantity = _quantity_of(of)
     if quantity.name == "dynamic_factor" and quantity.takes is Dynamics:
         if history.dynamic_factor is None:
-            raise ValueError(
-                'over_life: "dynamic_factor" needs a wear history with dynamics: wear(..., dynamics=Dynamics(...))'
-            )
+            raise ValueError('"dynamic_factor" needs a wear history with dynamics: wear(..., dynamics=Dynamics(...))')
         values = history.dynamic_factor
     else:
         values = jnp.where(solved(history.cycles), quantity(history.cycles), jnp.nan)
@@ -61,7 +59,7 @@ def pressure_error(history: WearHistory, measure: AbstractMeasure | None = None)
     It is the change of the pressure with the worn flanks on every other grid point, and with the contact width of each
     load. Arguments as for `over_life`.
     """
-    _single("pressure_error", history)
+    _single(history)
     return _of_all_loads(history, history.pressure_error, "smaller", measure)
 
 
@@ -79,14 +77,14 @@ def wear_depth(history: WearHistory, gear: Worn = "both") -> Steps:
     Raises:
         ValueError: for another gear than "pinion", "wheel" or "both".
     """
-    _single("wear_depth", history)
+    _single(history)
     depths = {
         "pinion": [history.pinion_depth],
         "wheel": [history.wheel_depth],
         "both": [history.pinion_depth, history.wheel_depth],
     }
     if gear not in depths:
-        raise ValueError(f'wear_depth: gear = {gear!r} must be "pinion", "wheel" or "both"')
+        raise ValueError(f'gear = {gear!r} must be "pinion", "wheel" or "both"')
     return jnp.where(history.converged, maximum(jnp.stack(depths[gear]), axis=(0, 2, 3)), jnp.nan)
 
 
@@ -96,7 +94,7 @@ def worn_volume(history: WearHistory) -> Float[Array, "steps gears parts"]:
     Where a gear wears at tip corners, its tip edge and its flank at the mate's tip corners count alike.
     NaN after a life whose contact was not found.
     """
-    _single("worn_volume", history)
+    _single(history)
     volume = 1e-3 * jnp.einsum("lgpsk,gk,s->lgp", history.depth, history.arc, history.slice_width)
     return jnp.where(history.converged[:, None, None], volume, jnp.nan)
 
@@ -111,7 +109,7 @@ def life_to_depth(history: WearHistory, limit: Given, gear: Worn = "both") -> Sc
         ValueError: for a limit that is not greater than 0, and as `wear_depth`.
     """
     limit = real(limit).astype(history.revolutions.dtype)
-    check("life_to_depth", "limit", limit, "um", low=0.0, open_low=True)
+    check("limit", limit, "um", low=0.0, open_low=True)
     return _reached(history.revolutions, wear_depth(history, gear), limit, goes_on=True)
 
 
@@ -125,19 +123,17 @@ def life_to(history: WearHistory, of: Measured, limit: Given, measure: AbstractM
         history, of, measure: as for `over_life`.
         limit: in the unit of the quantity.
     """
-    quantity = _quantity_of(of, "life_to")
+    quantity = _quantity_of(of)
     limit = real(limit).astype(history.revolutions.dtype)
-    check("life_to", "limit", limit, quantity.unit)
+    check("limit", limit, quantity.unit)
     values = over_life(history, quantity, measure)
     return _reached(history.revolutions, quantity.sign * values, quantity.sign * limit, goes_on=False)
 
 
-def _single(owner: str, history: WearHistory) -> None:
+def _single(history: WearHistory) -> None:
     """Refuses histories of many designs: their axis would be taken for that of the time steps of one."""
     if history.revolutions.ndim != 1:
-        raise ValueError(
-            f"{owner}: history is of a batch of designs, must be of one: put jax.vmap around {owner} as well"
-        )
+        raise ValueError("history is of a batch of designs, must be of one: put jax.vmap around this function as well")
 
 
 @quick_jit

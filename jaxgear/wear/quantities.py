@@ -71,13 +71,13 @@ def number_of(name: str, history: WearHistory, settings: Wear) -> Float[Array, "
 
 def _number(name: str, analysis: Analysis, wear: Wear) -> Float[Array, ""]:
     # all quantities of the same settings come from one life
-    return number_of(name, analysis.once(wear, "life", lambda: _life(name, analysis, wear)), wear)
+    return number_of(name, analysis.once(wear, "life", lambda: _life(analysis, wear)), wear)
 
 
-def _life(name: str, analysis: Analysis, wear: Wear) -> WearHistory:
+def _life(analysis: Analysis, wear: Wear) -> WearHistory:
     load = analysis.operating_point if wear.loads is None else None
     wear = replace(wear, largest_increment=None)
-    return wear.history(analysis.mesh_for(name), load, **analysis.flanks, deviation=analysis.deviation(name))
+    return wear.history(analysis.prepared_mesh, load, **analysis.flanks, deviation=analysis.deviation)
 
 
 def blocks_are_short(history: WearHistory) -> Bool[Array, ""]:

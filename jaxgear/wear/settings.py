@@ -1,6 +1,5 @@
 """Settings of wear: revolutions, wear coefficients and limits, and the quantities that are made of them."""
 
-from collections.abc import Callable
 from typing import Any
 
 import jax.numpy as jnp
@@ -12,7 +11,7 @@ from ..contact.operating_point import Torque
 from ..dynamics import Dynamics
 from ..metrics import AbstractSettings
 from ..microgeometry import AbstractModification
-from ..numerics import Numbers, count, number
+from ..numerics import Callback, Numbers, count, number
 from .case import LARGEST_COEFFICIENT
 from .history import BLOCKS, Keep, WearHistory, check_blocks, wear
 from .vibration import LineLoad, check_line_load
@@ -66,8 +65,8 @@ class Wear(AbstractSettings):
     loads: LoadSpectrum | None = None
 
     def check_together(self) -> None:
-        check_blocks("Wear", self.blocks)
-        check_line_load("Wear", self.line_load, self.dynamics)
+        check_blocks(self.blocks)
+        check_line_load(self.line_load, self.dynamics)
 
     @property
     def coefficients(self) -> Float[Array, " gears"]:
@@ -84,7 +83,7 @@ class Wear(AbstractSettings):
         wheel: AbstractModification | None = None,
         deviation: Numbers | None = None,
         keep: Keep | None = None,
-        callback: Callable[[float, float], None] | None = None,
+        callback: Callback | None = None,
     ) -> WearHistory:
         """The wear history of a design; arguments and errors as `wear`.
 

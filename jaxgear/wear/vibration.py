@@ -50,7 +50,6 @@ class Vibration(eqx.Module):
 
 
 def vibration_of(
-    owner: str,
     mesh: Mesh,
     loads: OperatingPoint,
     settings: Dynamics | None,
@@ -63,7 +62,6 @@ def vibration_of(
     Where nothing is traced the mesh has as many pairs and the integrator as many steps as the new flanks need.
 
     Args:
-        owner: name of the caller, for messages.
         mesh: prepared mesh.
         loads: with a leading axis (torques,).
         settings, line_load: as for `wear`.
@@ -75,15 +73,13 @@ def vibration_of(
         ValueError: for a dynamic load without dynamics, another word, loads without speed, at rest or of nothing, and
             as `mesh_force`.
     """
-    check_line_load(owner, line_load, settings)
+    check_line_load(line_load, settings)
     if settings is None:
         return None
     if loads.speed is None:
-        raise ValueError(
-            f"{owner}: dynamics needs a speed: give OperatingPoint(torque, speed), or speeds of the spectrum"
-        )
-    check(owner, "speed with dynamics", loads.speed, "rpm", low=0.0, open_low=True)
-    check(owner, "torque with dynamics", loads.torque, "N m", low=0.0, open_low=True)
+        raise ValueError("dynamics needs a speed: give OperatingPoint(torque, speed), or speeds of the spectrum")
+    check("speed with dynamics", loads.speed, "rpm", low=0.0, open_low=True)
+    check("torque with dynamics", loads.torque, "N m", low=0.0, open_low=True)
     numbers, rest = eqx.partition(settings, eqx.is_array)
     settings = eqx.combine(jax.tree.map(lambda number: number.astype(loads.torque.dtype), numbers), rest)
     coast, steps = (flanks["pinion"], flanks["wheel"]), settings.traced_steps
@@ -101,7 +97,7 @@ def vibration_of(
     return Vibration(settings, fine, coast, off, steps, line_load != "static")
 
 
-def check_line_load(owner: str, line_load: object, dynamics: object) -> None:
+def check_line_load(line_load: object, dynamics: object) -> None:
     """Checks under which load flanks are to wear.
 
     Raises:
@@ -109,8 +105,8 @@ def check_line_load(owner: str, line_load: object, dynamics: object) -> None:
         ValueError: for another word, and for a dynamic load without dynamics.
     """
     if line_load not in (None, *get_args(LineLoad)):
-        raise ValueError(f'{owner}: line_load = {line_load!r} must be "static" or "dynamic"')
+        raise ValueError(f'line_load = {line_load!r} must be "static" or "dynamic"')
     if dynamics is None and line_load == "dynamic":
-        raise ValueError(f'{owner}: line_load = "dynamic" needs dynamics: give jaxgear.dynamics.Dynamics(...)')
+        raise ValueError('line_load = "dynamic" needs dynamics: give jaxgear.dynamics.Dynamics(...)')
     if dynamics is not None and not isinstance(dynamics, Dynamics):
-        raise TypeError(f"{owner}: dynamics is of type {type(dynamics).__name__}, must be Dynamics")
+        raise TypeError(f"dynamics is of type {type(dynamics).__name__}, must be Dynamics")

@@ -231,7 +231,7 @@ def passage_depth(cycle: MeshCycle, coefficient: Numbers) -> tuple[Load, Load]:
         ValueError: for a negative coefficient.
     """
     coefficient = real(coefficient).astype(cycle.line_load.dtype)
-    check("passage_depth", "coefficient", coefficient, "m2/N", low=0.0)
+    check("coefficient", coefficient, "m2/N", low=0.0)
     moving = cycle.kinematics
     pinion, wheel = map(over_slices, specific_sliding(moving.path_of_contact, moving.contact_path))
     worn = UM_PER_LOAD * coefficient * cycle.line_load / jnp.cos(moving.pair.pinion.base_helix_angle)

@@ -80,7 +80,7 @@ def _readable_arcs(tooth: Tooth) -> np.ndarray:
     low, high = tooth.arc(tooth.form_roll_length) + _PATCH, tooth.arc(tooth.tip_roll_length) - _CLEAR * _PATCH
     if not high - low > _PATCH:
         raise ValueError(
-            f"finite_element_compliance: tip_diameter leaves {high - low + (1 + _CLEAR) * _PATCH:.3g} x module of "
+            f"tip_diameter leaves {high - low + (1 + _CLEAR) * _PATCH:.3g} x module of "
             f"involute, must be more than {(2 + _CLEAR) * _PATCH:.3g}"
         )
     return np.linspace(low, high, POINTS)

@@ -88,7 +88,7 @@ class TabulatedCompliance(AbstractCompliance, Checked):
             for table, plane in zip(tables, structure_planes(self.plane)):
                 fault = different(table, _concrete(gear, plane)[0])
                 if fault:
-                    raise ValueError(f"finite_element_compliance: {name} {fault}: make one for every shape of gear")
+                    raise ValueError(f"{name} {fault}: make one for every shape of gear")
 
     def _of_gear(self, tables: tuple[GearTable, ...], load: ToothLoad, driven: bool) -> Matrix:
         planes = structure_planes(self.plane)
@@ -152,10 +152,10 @@ def finite_element_compliance(
     for name, path in (("pinion", pinion_table), ("wheel", wheel_table)):
         gear: Gear = getattr(pair, name)
         if any(concrete(leaf) is None for leaf in jax.tree.leaves(gear)):
-            raise ValueError(f"finite_element_compliance: pair: {name} is traced, must be of concrete numbers")
+            raise ValueError(f"pair: {name} is traced, must be of concrete numbers")
         # elements of displacements lock in plane strain
         ratio = gear.material.poisson_ratio
-        check("finite_element_compliance", "poisson_ratio", ratio, "", high=_INCOMPRESSIBLE, open_high=True)
+        check("poisson_ratio", ratio, "", high=_INCOMPRESSIBLE, open_high=True)
         tables[name] = _tables(gear, plane, None if path is None else Path(path), folder)
     return TabulatedCompliance(pinion=tables["pinion"], wheel=tables["wheel"], plane=plane)
 
@@ -175,12 +175,10 @@ def _tables(gear: Gear, state: PlaneState, path: Path | None, folder: Path | Non
 
 
 def _check_known(pair: GearPair) -> None:
-    check_spur("finite_element_compliance", *pair.gears)
+    check_spur(*pair.gears)
     for name, gear in zip(("pinion", "wheel"), pair.gears):
         if gear.protuberance is not None:
-            raise ValueError(
-                f"finite_element_compliance: {name} protuberance: must be left out, its fillet is not known here yet"
-            )
+            raise ValueError(f"{name} protuberance: must be left out, its fillet is not known here yet")
 
 
 def _concrete(gear: Gear, plane: Plane) -> tuple[Shape, float]:

@@ -218,4 +218,4 @@ def _refusal(name: str) -> str:
         why = "it moves bore and tip against the module where bore_diameter or tip_diameter is given: leave both None"
     else:
         why = "its table is of one value: use default_compliance"
-    return f"finite_element_compliance: no derivative by {name}: {why}"
+    return f"no derivative by {name}: {why}"

@@ -213,7 +213,7 @@ def _check(found: Sector, tooth: Tooth) -> None:
         else f"teeth = {tooth.shape.teeth:g} with profile_shift = {tooth.shape.profile_shift:g}"
     )
     raise ValueError(
-        f"finite_element_compliance: {blame}, which cannot be meshed: the narrowest angle of an element has the sine "
+        f"{blame}, which cannot be meshed: the narrowest angle of an element has the sine "
         f"{narrowest:.2g}, must be greater than {_NARROWEST:g}"
     )
 

@@ -28,7 +28,7 @@ def cached(folder: Path | None, shape: Shape, build: Callable[[Shape], GearNumbe
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise ValueError(f"finite_element_compliance: cache = {str(folder)!r}: {error.strerror}") from error
+        raise ValueError(f"cache = {str(folder)!r}: {error.strerror}") from error
     files = KeptFiles(folder, f"finite elements {VERSION}".encode())
     made_of = json.dumps(shape.numbers).encode()
     content = files.read(made_of)

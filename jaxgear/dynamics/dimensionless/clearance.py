@@ -53,7 +53,7 @@ class PolynomialClearance(AbstractMeshForce):
         """
         if order not in ORDERS:
             raise ValueError(f"PolynomialClearance.fit: order = {order!r} must be 3, 5 or 7")
-        check("PolynomialClearance.fit", "range", range, "", low=1.0, open_low=True)
+        check("PolynomialClearance.fit: range", range, "", low=1.0, open_low=True)
         return cls(_fitted(order, real(range)), real(range))
 
     @classmethod
@@ -69,7 +69,7 @@ class PolynomialClearance(AbstractMeshForce):
     def force(self, place: tuple[()], dte: Scalar) -> Scalar:
         known, most = concrete(dte), concrete(self.range)
         if known is not None and most is not None:
-            check("PolynomialClearance", "dte", known, "", low=-most, high=most)
+            check("PolynomialClearance: dte", known, "", low=-most, high=most)
         inside = jnp.abs(dte) <= self.range
         x = jnp.where(inside, dte, 0.0)
         return jnp.where(inside, self.polynomial(x), jnp.nan)

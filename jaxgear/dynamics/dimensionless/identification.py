@@ -69,13 +69,13 @@ def from_mesh(
         ValueError: in one line, for no load, no backlash or not exactly one damping.
     """
     if (damping_ratio is None) == (damping is None):
-        raise ValueError("from_mesh: give either damping_ratio or damping [N s/um]")
+        raise ValueError("give either damping_ratio or damping [N s/um]")
     if stiffness not in ("secant", "tangent"):
-        raise ValueError(f'from_mesh: stiffness = {stiffness!r} must be "secant" or "tangent"')
+        raise ValueError(f'stiffness = {stiffness!r} must be "secant" or "tangent"')
     half = 0.5 * cycle.margins.backlash if half_clearance is None else real(half_clearance)
-    check("from_mesh", "half_clearance", half, "um", low=0.0, open_low=True)
-    check("from_mesh", "mass", mass, "kg", low=0.0, open_low=True)
-    check("from_mesh", "torque", cycle.torque, "N m", low=0.0, open_low=True)
+    check("half_clearance", half, "um", low=0.0, open_low=True)
+    check("mass", mass, "kg", low=0.0, open_low=True)
+    check("torque", cycle.torque, "N m", low=0.0, open_low=True)
     curve = secant_stiffness(cycle) if stiffness == "secant" else cycle.tangent_stiffness
     mass, mean = real(mass), jnp.mean(curve)
     # the phase 0 of the mesh is the time 0 of the model, with which the torque fluctuates

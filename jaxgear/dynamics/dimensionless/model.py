@@ -232,8 +232,8 @@ def rectangular_harmonics(ratio: Given, share: Given, count: int = 5) -> Float[A
         share: of the cycle with two pairs, contact ratio - 1.
         count: of harmonics.
     """
-    check("rectangular_harmonics", "ratio", ratio, "", low=0.0, open_low=True)
-    check("rectangular_harmonics", "share", share, "", low=0.0, high=1.0)
+    check("ratio", ratio, "", low=0.0, open_low=True)
+    check("share", share, "", low=0.0, high=1.0)
     ratio, share = real(ratio), real(share)
     order = real(np.arange(1, count + 1)).astype(ratio.dtype)
     return 2 * (ratio - 1) * jnp.sin(jnp.pi * order * share) / (jnp.pi * order * (1 + (ratio - 1) * share))

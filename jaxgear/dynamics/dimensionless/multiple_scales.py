@@ -171,7 +171,7 @@ def effective_forcing(state: LoadedMean, frequency: Scalar, order: int) -> Compl
         order: 1, 2 or 3.
     """
     if order not in (1, 2, 3):
-        raise ValueError(f"effective_forcing: order = {order!r} must be 1, 2 or 3")
+        raise ValueError(f"order = {order!r} must be 1, 2 or 3")
     direct, line = state.forcing(frequency), state.response(frequency)
     if order == 1:
         return direct[0]

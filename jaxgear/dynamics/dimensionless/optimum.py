@@ -25,7 +25,7 @@ def vector(relief: CycleRelief, free: Sequence[str]) -> Float[Array, " numbers"]
     """The free numbers of a relief."""
     parts = [jnp.ravel(leaf) for name in free for leaf in jax.tree.leaves(getattr(relief, name))]
     if not parts:
-        raise ValueError(f"dynamic_profile_modification: {type(relief.curve).__name__} has no coefficients to optimize")
+        raise ValueError(f"{type(relief.curve).__name__} has no coefficients to optimize")
     return jnp.concatenate(parts)
 
 
@@ -49,7 +49,7 @@ def bounds_of(
     model: DimensionlessModel, relief: CycleRelief, free: Sequence[str], given: Bounds
 ) -> tuple[Vector, Vector]:
     if set(given) - set(free):
-        raise ValueError(f"dynamic_profile_modification: bounds = {sorted(given)} must be of what is free, {free!r}")
+        raise ValueError(f"bounds = {sorted(given)} must be of what is free, {free!r}")
     ratio = relief.contact_ratio
     usual: dict[str, tuple[Numbers, Numbers]] = {
         "amount": (jnp.zeros_like(model.load), 4 * model.load),
@@ -66,7 +66,7 @@ def bounds_of(
         least, most = given.get(name, usual[name])
         known = concrete(real(least)), concrete(real(most))
         if known[0] is not None and known[1] is not None and (known[0] > known[1]).any():
-            raise ValueError(f"dynamic_profile_modification: bounds of {name} = ({least}, {most}) must not fall")
+            raise ValueError(f"bounds of {name} = ({least}, {most}) must not fall")
         low.append(jnp.broadcast_to(real(least), count))
         high.append(jnp.broadcast_to(real(most), count))
     return jnp.concatenate(low), jnp.concatenate(high)
@@ -181,14 +181,14 @@ def dynamic_profile_modification(
         method: "adam" or "genetic", of bit strings.
         seed: of the random numbers of "genetic".
     """
-    check("dynamic_profile_modification", "frequency", frequency, "", low=0.0, open_low=True)
-    whole("dynamic_profile_modification", "iterations", iterations)
+    check("frequency", frequency, "", low=0.0, open_low=True)
+    whole("iterations", iterations)
     if method not in ("adam", "genetic"):
-        raise ValueError(f'dynamic_profile_modification: method = {method!r} must be "adam" or "genetic"')
-    whole("dynamic_profile_modification", "seed", seed, 0)
+        raise ValueError(f'method = {method!r} must be "adam" or "genetic"')
+    whole("seed", seed, 0)
     names = tuple(free)
     if not names or set(names) - {"amount", "length", "curve"}:
-        raise ValueError(f'dynamic_profile_modification: free = {names!r} must name "amount", "length" or "curve"')
+        raise ValueError(f'free = {names!r} must name "amount", "length" or "curve"')
     model = with_relief(model, None)
     low, high = bounds_of(model, relief, names, bounds or {})
     at = real(frequency)

@@ -57,7 +57,7 @@ class CycleRelief(Checked):
     def check_together(self) -> None:
         ratio = concrete(self.contact_ratio)
         if ratio is not None:
-            check("CycleRelief", "length", self.length, "base pitches", high=0.5 * ratio)
+            check("CycleRelief: length", self.length, "base pitches", high=0.5 * ratio)
 
     @property
     def ends(self) -> Float[Array, " two"]:
@@ -78,7 +78,7 @@ def cycle_relief(relief: TipRelief, pair: GearPair, half_clearance: Given) -> Cy
         ValueError: for a half clearance that is not positive, or a relief without length or longer than half of the
             path of contact.
     """
-    check("cycle_relief", "half_clearance", half_clearance, "um", low=0.0, open_low=True)
+    check("half_clearance", half_clearance, "um", low=0.0, open_low=True)
     path = path_of_contact(pair)
     # at mesh position 0 a pair touches at the pitch point, and one later it is a base pitch further on
     begin = path.start / path.base_pitch
@@ -105,11 +105,11 @@ def tip_relief(relief: CycleRelief, pair: GearPair, half_clearance: Given) -> Ti
     Raises:
         ValueError: for a half clearance that is not positive, or another contact ratio than that of the pair.
     """
-    check("tip_relief", "half_clearance", half_clearance, "um", low=0.0, open_low=True)
+    check("half_clearance", half_clearance, "um", low=0.0, open_low=True)
     path = path_of_contact(pair)
     ratio, own = concrete(relief.contact_ratio), concrete(path.contact_ratio)
     if ratio is not None and own is not None and abs(ratio - own) > _SAME_RATIO:
-        raise ValueError(f"tip_relief: contact_ratio = {ratio:.4g} of the relief must be that of the pair, {own:.4g}")
+        raise ValueError(f"contact_ratio = {ratio:.4g} of the relief must be that of the pair, {own:.4g}")
     return TipRelief(relief.amount * real(half_clearance), relief.length * path.base_pitch, relief.curve)
 
 
@@ -123,5 +123,5 @@ def largest_relief(load: Given, torque_fluctuation: Given, displacement: Given, 
         load, torque_fluctuation, displacement: F_m, F_aT, F_ah.
         least_stiffness: smallest stiffness over its mean, 1 + sum B_j cos(...) at its least.
     """
-    check("largest_relief", "least_stiffness", least_stiffness, "", low=0.0, open_low=True)
+    check("least_stiffness", least_stiffness, "", low=0.0, open_low=True)
     return (real(load) + real(displacement) + real(torque_fluctuation)) / real(least_stiffness)

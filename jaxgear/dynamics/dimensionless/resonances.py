@@ -74,7 +74,7 @@ def super_harmonic_resonance(state: LoadedMean, frequency: Numbers, order: int =
         frequency: Omega, shape (frequencies,).
         order: 2 or 3.
     """
-    return _resonance(state, real(frequency), whole("super_harmonic_resonance", "order", order, 2, 3))
+    return _resonance(state, real(frequency), whole("order", order, 2, 3))
 
 
 def response_curve(state: LoadedMean, amplitude: Numbers, *, order: int = 1) -> Backbone:
@@ -89,8 +89,8 @@ def response_curve(state: LoadedMean, amplitude: Numbers, *, order: int = 1) -> 
         amplitude: A > 0, shape (amplitudes,).
         order: 1, 2 or 3.
     """
-    check("response_curve", "amplitude", amplitude, "", low=0.0, open_low=True)
-    order = whole("response_curve", "order", order, 1, 3)
+    check("amplitude", amplitude, "", low=0.0, open_low=True)
+    order = whole("order", order, 1, 3)
     return _curve(state, jnp.atleast_1d(real(amplitude)), order)
 
 
@@ -106,7 +106,7 @@ def sub_harmonic_resonance(state: LoadedMean, frequency: Numbers, *, order: int 
         frequency: Omega, shape (frequencies,).
         order: harmonic that excites, 1 to 6.
     """
-    order = whole("sub_harmonic_resonance", "order", order, 1, len(state.orders))
+    order = whole("order", order, 1, len(state.orders))
     return _sub_harmonic(state, real(frequency), order)
 
 
@@ -116,13 +116,13 @@ def parametric_instability(state: LoadedMean, *, order: int = 1) -> tuple[Scalar
     order Omega = 2 (omega_0 + shift -+ sqrt((|h| / (2 omega_0))^2 - zeta^2)), with h and shift at 2 omega_0 / order:
     |Omega - 2| < sqrt(B_1^2 / 4 - 4 zeta^2) for a dead zone and order 1.
     """
-    order = whole("parametric_instability", "order", order, 1, len(state.orders))
+    order = whole("order", order, 1, len(state.orders))
     return _instability(state, order)
 
 
 def damping_threshold(state: LoadedMean, *, order: int = 1) -> Scalar:
     """Damping ratio zeta from which on nothing is unstable at order Omega ~ 2 omega_0: |h| / (2 omega_0)."""
-    order = whole("damping_threshold", "order", order, 1, len(state.orders))
+    order = whole("order", order, 1, len(state.orders))
     return jnp.abs(_coupling(state, 2 * state.frequency / order, order)) / (2 * state.frequency)
 
 
@@ -143,7 +143,7 @@ def combination_forcing(
         sign: 1 for the sum, -1 for the difference.
     """
     if sign not in (1, -1):
-        raise ValueError(f"combination_forcing: sign = {sign!r} must be 1 or -1")
+        raise ValueError(f"sign = {sign!r} must be 1 or -1")
     line, stiff = zip(*(_of_line(state, model, real(frequency), place) for place in (first, second)))
     if sign == -1:
         line, stiff = (line[0], line[1].conj()), (stiff[0], stiff[1].conj())
@@ -265,7 +265,7 @@ def _coupling(state: LoadedMean, frequency: Scalar, order: int) -> Complex[Array
 
 def _of_line(state: LoadedMean, model: DimensionlessModel, frequency: Scalar, place: int):
     """Half amplitude of the response to one excitation of a model, and the stiffness harmonic of the same order."""
-    place = whole("combination_forcing", "place", place, 0, len(model.orders) - 1)
+    place = whole("place", place, 0, len(model.orders) - 1)
     order = model.orders[place]
     forced = order * frequency
     same = state.orders == order

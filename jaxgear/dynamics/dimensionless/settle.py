@@ -44,9 +44,9 @@ def settled_vibration(
         periods: mesh cycles that are recorded, a multiple of the vibration's period: 2 for sub-harmonics of order 1/2.
         steps: per mesh cycle, Runge-Kutta of order four.
     """
-    check("settled_vibration", "frequency", frequency, "", low=0.0, open_low=True)
+    check("frequency", frequency, "", low=0.0, open_low=True)
     for name, value in (("settling", settling), ("periods", periods), ("steps", steps)):
-        whole("settled_vibration", name, value)
+        whole(name, value)
     frequency = real(frequency).astype(model.load.dtype)
     begin = at_rest(model) if start is None else real(start)
     return _settle(model, frequency, begin, settling, periods, steps)

@@ -68,7 +68,7 @@ def write_rexs(
             converge, arguments that a cycle gives already, a modification with a step, or where the file cannot be
             written.
     """
-    check("write_rexs", "error", error, "um", low=0.0, open_low=True)
+    check("error", error, "um", low=0.0, open_low=True)
     if cycle is not None:
         pinion, wheel, torque, speed, friction = _of_cycle(pair, cycle, pinion, wheel, torque, speed, friction)
     if any(isinstance(leaf, jax.core.Tracer) or np.ndim(leaf) for leaf in jax.tree.leaves(pair)):
@@ -111,10 +111,10 @@ def write_rexs(
         if modification is not None:
             Writer(model, both, frame, f"write_rexs: {name}", error).write(modification)
     if torque is not None:
-        check("write_rexs", "torque", torque, "N m", low=0.0)
+        check("torque", torque, "N m", low=0.0)
         model.under_load(_CASE, data[0], torque=(np.asarray(torque), "N m"))
     if speed is not None:
-        check("write_rexs", "speed", speed, "rpm", low=0.0)
+        check("speed", speed, "rpm", low=0.0)
         model.under_load(_CASE, gears[0], rotational_speed=(np.asarray(speed), "1 / min"))
     if cycle is not None:
         write_results(model, data[0], cycle, case=_CASE, speed=speed, friction=friction)
