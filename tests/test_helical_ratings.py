@@ -137,12 +137,12 @@ def test_contact_stress_is_that_of_the_standard(pair):
     m1 = np.tan(alpha_wt) / np.sqrt((one - t1) * (two - (eps - 1) * t2))
     m2 = np.tan(alpha_wt) / np.sqrt((two - t2) * (one - (eps - 1) * t1))
     single = [max(m - overlap * (m - 1), 1.0) for m in (m1, m2)]
-    found = [float(np.sqrt(x)) for x in contact_factor_squares(pair)]
+    found = [float(np.sqrt(x)) for x in contact_factor_squares(pair, path_of_contact(pair))]
     wanted = [zone, 189.812, sharing, 1 / np.sqrt(np.cos(beta)), *single]
     np.testing.assert_allclose(found, wanted, rtol=1e-5)
     line = 3000.0 / np.cos(alpha_t)  # F_t = 3000 N per mm of face width
     stress = wanted[0] * wanted[1] * wanted[2] * wanted[3] * np.sqrt(3000.0 / d1 * (1 + d1 / d2))
-    squares = metrics.stress.nominal_stress_squares(pair)
+    squares = metrics.stress.nominal_stress_squares(pair, path_of_contact(pair))
     np.testing.assert_allclose(np.sqrt(line * np.array(squares)), stress * np.array(single), rtol=1e-5)
 
 
@@ -154,7 +154,7 @@ def test_root_stress_is_that_of_the_virtual_gear(pair):
     """
     pair = pair()
     eps = float(path_of_contact(pair).contact_ratio)
-    for gear, found in zip(pair.gears, single_contact_factors(pair)):
+    for gear, found in zip(pair.gears, single_contact_factors(pair, path_of_contact(pair))):
         beta, alpha = np.deg2rad(abs(float(gear.helix_angle))), np.deg2rad(20.0)
         m, x, z = float(gear.module), float(gear.profile_shift), float(gear.teeth)
         beta_b = np.arcsin(np.sin(beta) * np.cos(alpha))
@@ -198,7 +198,7 @@ def test_local_root_stress_is_of_every_slice_at_its_own_height():
     per_load = found / np.where(np.asarray(cycle.line_load) > 0, np.asarray(cycle.line_load), np.nan)
     order = np.argsort(height[~np.isnan(per_load)])
     assert (np.diff(per_load[~np.isnan(per_load)][order]) > -1e-12).all()
-    factors = single_contact_factors(cycle.kinematics.pair)[0]
+    factors = single_contact_factors(cycle.kinematics.pair, cycle.kinematics.path_of_contact)[0]
     cosine = np.cos(float(side.gear.transverse_pressure_angle))
     at_outer = float(factors.form * factors.correction) * cosine / 3.0
     assert np.nanmin(per_load) < at_outer < np.nanmax(per_load)

@@ -9,6 +9,7 @@ import threading
 import time
 from dataclasses import replace
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -18,6 +19,7 @@ from catalogue import LINE, SLIDING, gear_pair
 import jaxgear as jg
 from jaxgear.cli import cache
 from jaxgear.contact import begin_contact
+from jaxgear.contact import mesh as mesh_module
 from jaxgear.numerics import programs
 from jaxgear.numerics.durable import forget_the_oldest
 from jaxgear.numerics.programs import ProgramStore, begin, keep, program
@@ -117,6 +119,25 @@ def test_errors_are_those_of_the_function(shelf):
 
     with pytest.raises(ValueError, match="^no"):
         refuse(jnp.ones(2))
+
+
+def test_finer_meshes_and_other_compliances_compile_what_is_new_alone(shelf, traced, monkeypatch):
+    pair, fine = gear_pair(), replace(LINE, positions=128)
+    jg.prepare(pair, resolution=replace(LINE, positions=64))
+    begun = len(traced)
+    made = jg.prepare(pair, resolution=fine)
+    assert traced[begun:] == ["_joined"]
+    begun = len(traced)
+    jg.prepare(pair, compliance=replace(jg.default_compliance(), edge_softening=False), resolution=fine)
+    # another kind of contact law is joined otherwise
+    assert traced[begun:] == ["_for_gears", "_arrays_of", "_joined"]
+    monkeypatch.setattr(mesh_module, "_AT_ONCE", 128)  # all positions in one run of the programs
+    whole = jg.prepare(pair, resolution=fine)
+    # steps of the edge pairs, which the status alone reads, differ from one to the next beyond the path of contact
+    np.testing.assert_allclose(made.outer_steps, whole.outer_steps, rtol=0.05)
+    made, whole = (eqx.tree_at(lambda mesh: mesh.outer_steps, mesh, 0.0) for mesh in (made, whole))
+    for one, other in zip(jax.tree.leaves(made), jax.tree.leaves(whole), strict=True):
+        np.testing.assert_allclose(one, other, rtol=1e-9, atol=1e-12)
 
 
 CONTACT = "_arrays_of", "slid_material", "_solve_removed"

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from ..geometry import GearPair, PathOfContact, path_of_contact
+from ..geometry import GearPair, PathOfContact, explicit, pair_geometry
 from ..numerics import concrete, program
 from .kinematics import Contacts, contacts
 from .resolution import Resolution, reach
@@ -54,13 +54,13 @@ def pairs_alternate(pair: GearPair, resolution: Resolution, deflection: float | 
     wanted = _contained(pair, deflection)
     if not 2 < resolution.chosen_pairs <= fewest_pairs(pair, deflection=wanted):
         return False
-    return bool(np.min(np.asarray(_gaps_of_slices(pair))) > wanted)
+    path = pair_geometry(explicit(pair)).path_of_contact
+    return bool(np.min(np.asarray(_gaps_of_slices(pair, path))) > wanted)
 
 
 @program
-def _gaps_of_slices(pair: GearPair) -> Array:
+def _gaps_of_slices(pair: GearPair, contact: PathOfContact) -> Array:
     """Transmission error at which a third pair touches in a slice, behind and ahead of the two next to the middle."""
-    contact = path_of_contact(pair)
     return closing(contacts(pair, contact, jnp.stack([-contact.base_pitch, contact.base_pitch])))
 
 
@@ -79,7 +79,8 @@ def fewest_pairs(pair: GearPair, *, deflection: float = 100.0) -> int:
     Raises:
         ValueError: when more than 10 pairs beyond those on the path of contact would be needed.
     """
-    fewest, gaps = (np.asarray(found) for found in _next_gaps(pair))
+    path = pair_geometry(explicit(pair)).path_of_contact
+    fewest, gaps = (np.asarray(found) for found in _next_gaps(pair, path))
     enough = np.flatnonzero(gaps.min(axis=1) > deflection)
     if not enough.size:
         raise ValueError(
@@ -91,9 +92,9 @@ def fewest_pairs(pair: GearPair, *, deflection: float = 100.0) -> int:
 
 
 @program
-def _next_gaps(pair: GearPair) -> tuple[Array, Float[Array, "counts 2"]]:
+def _next_gaps(pair: GearPair, contact: PathOfContact) -> tuple[Array, Float[Array, "counts 2"]]:
     """Pairs on the path of contact; gaps of the next ones behind and ahead with these, and with ever one more [um]."""
-    contact, ahead = path_of_contact(pair), _half_overlap(pair)
+    ahead = _half_overlap(pair)
     start, end = contact.start - ahead, contact.end + ahead
     fewest = jnp.maximum(_covering(jnp.maximum(end, -start) / contact.base_pitch), float(_FEWEST_PAIRS))
     counts = fewest + jnp.arange(_MORE_PAIRS + 1, dtype=fewest.dtype)

@@ -22,7 +22,6 @@ References:
     is derived from the involute's generation.
 """
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import equinox as eqx
@@ -32,7 +31,7 @@ import numpy as np
 from jaxtyping import Array, Bool, Float
 
 from ..compliance import Plane
-from ..geometry import Gear, GearPair, Outline, PathOfContact, explicit, path_of_contact
+from ..geometry import Gear, GearPair, PathOfContact, explicit, path_of_contact
 from ..microgeometry import Flank
 from ..numerics import Checked, changed, concrete, on_both, over_batch, program, real, result
 from .resolution import Resolution
@@ -258,7 +257,8 @@ class Kinematics(Checked):
 @program
 def _sides(moving: Kinematics) -> tuple[Side, Side]:
     pair, contact = moving.pair, moving.path_of_contact
-    return sides(pair, contact, contacts(pair, contact, moving.contact_path))
+    ends = _ends(pair, contact, moving.contact_path)
+    return sides(pair, contact, *_roll_lengths(contact, moving.contact_path, ends, on_both(_touched, *ends)))
 
 
 def _phases(first: Array, count: int) -> Array:
@@ -294,86 +294,129 @@ def contacts(pair: GearPair, contact: PathOfContact, path: Float[Array, "..."], 
     A position is the mean one of both gears: under a transmission error d the pinion leads it by d/2 and the wheel
     lags by d/2, so a corner is d/2 farther out than its nominal position and its gap grows by half its slope times d.
     """
-    pinion_base, wheel_base = contact.pinion_base_radius, contact.wheel_base_radius
-    approach = pair.wheel.tip_roll_length, wheel_base, contact.pinion_roll_length(contact.start), pinion_base
-    recess = pair.pinion.tip_roll_length, pinion_base, contact.wheel_roll_length(contact.end), wheel_base
-    outside = contact.start - path, path - contact.end
-    at_form = contact.start_shortened > 0, contact.end_shortened > 0
-    tips = (  # of the gear whose tip is at that end
-        (contact.wheel_roll_length(contact.start), pair.wheel.edge_radius),
-        (contact.pinion_roll_length(contact.end), pair.pinion.edge_radius),
-    )
-    # the edge of an undercut passes the tip of the mate about as far outside the path as this is shortened
-    reaches = (REACH * contact.base_pitch + less for less in (contact.start_shortened, contact.end_shortened))
-    before, after = on_both(lambda given: _corner(*given), *zip(outside, at_form, (approach, recess), tips, reaches))
-    on_path = jnp.clip(path, contact.start, contact.end)
-    apart = 0.0 if extended else jnp.where(path == on_path, 0.0, 1e3 * contact.base_pitch)
-    ahead, behind = (x > 0 for x in outside)
+    ends = _ends(pair, contact, path)
+    edges = pair.wheel.edge_radius, pair.pinion.edge_radius
+    before, after = on_both(lambda given: _corner(*given), *zip(ends, edges))
+    beyond = (ends[0].outside > 0) | (ends[1].outside > 0)
+    apart = 0.0 if extended else jnp.where(beyond, 1e3 * contact.base_pitch, 0.0)
     return Contacts(
-        jnp.select(
-            [ahead & ~at_form[0], behind & at_form[1]],
-            [before.touched, after.touched],
-            contact.pinion_roll_length(on_path),
-        ),
-        jnp.select(
-            [behind & ~at_form[1], ahead & at_form[0]],
-            [after.touched, before.touched],
-            contact.wheel_roll_length(on_path),
-        ),
+        *_roll_lengths(contact, path, ends, (before.touched, after.touched)),
         before.gap + after.gap + apart,
         1 - 0.5e-3 * (before.slope + after.slope),
-        jnp.add(*(jnp.where(form, 0.0, jnp.maximum(x, 0.0)) for form, x in zip(at_form, outside))),
+        jnp.add(*(jnp.where(end.at_form, 0.0, jnp.maximum(end.outside, 0.0)) for end in ends)),
     )
+
+
+class _End(NamedTuple):
+    """One end of the path of contact and every contact outside it.
+
+    Attributes:
+        outside: distance of the contacts outside this end [mm], negative before it.
+        at_form: whether the path ends at the form circle of the mate, whose edge touches then.
+        lengths: of the tip corner and its mate, as `corner_gap` takes them.
+        tip_gear_end: roll length at this end of the gear whose tip is there [mm].
+        reach: beyond this distance the gap goes on along its tangent, so that far pairs stay finite and apart [mm].
+    """
+
+    outside: Real
+    at_form: Bool[Array, ""]
+    lengths: tuple[Scalar, Scalar, Scalar, Scalar]
+    tip_gear_end: Scalar
+    reach: Scalar
+
+    def at_contacts(self, value: Array) -> Array:
+        """One number at every contact each: a derivative then sums over the contacts once."""
+        return jnp.broadcast_to(value, self.outside.shape)
+
+    def touching(self, x: Real) -> tuple[Real, Real]:
+        """Gap of a sharp corner [um] and roll length of the involute that it touches, at distances outside [mm]."""
+        tip, tip_base, mate, mate_base = self.lengths
+        chosen = [
+            self.at_contacts(jnp.where(self.at_form, *both))
+            for both in zip((mate, mate_base, self.tip_gear_end, tip_base), self.lengths)
+        ]
+        return corner_gap(jnp.where(self.at_contacts(self.at_form), -x, x), *chosen)
+
+    def on_flank(self, touched: Real) -> Real:
+        """Roll lengths of the involute that is touched, of a form circle's edge up to the tip of the mate."""
+        return jnp.where(self.at_form, jnp.minimum(touched, self.at_contacts(self.lengths[0])), touched)
+
+    @property
+    def near(self) -> Real:
+        """Distance of the contacts outside [mm], from zero to the reach."""
+        return jnp.clip(self.outside, 0.0, self.reach)
+
+
+def _ends(pair: GearPair, contact: PathOfContact, path: Real) -> tuple[_End, _End]:
+    """Start and end of the path of contact."""
+    pinion_base, wheel_base = contact.pinion_base_radius, contact.wheel_base_radius
+    (first, second), (last, before_last) = (
+        (contact.pinion_roll_length(place), contact.wheel_roll_length(place)) for place in (contact.start, contact.end)
+    )
+    # the edge of an undercut passes the tip of the mate about as far outside the path as this is shortened
+    start, end = (
+        (shortened > 0, REACH * contact.base_pitch + shortened)
+        for shortened in (contact.start_shortened, contact.end_shortened)
+    )
+    approach = pair.wheel.tip_roll_length, wheel_base, first, pinion_base
+    recess = pair.pinion.tip_roll_length, pinion_base, before_last, wheel_base
+    return (
+        _End(contact.start - path, start[0], approach, second, start[1]),
+        _End(path - contact.end, end[0], recess, last, end[1]),
+    )
+
+
+def _touched(end: _End) -> Real:
+    """Roll lengths of the mate where a corner at this end touches it [mm]."""
+    return end.on_flank(end.touching(end.near)[1])
+
+
+def _roll_lengths(
+    contact: PathOfContact, path: Real, ends: tuple[_End, _End], touched: tuple[Real, Real]
+) -> tuple[Real, Real]:
+    """Roll lengths of the contacts on pinion and wheel [mm]; `touched` by corners at both ends."""
+    on_path = jnp.clip(path, contact.start, contact.end)
+    ahead, behind = (end.outside > 0 for end in ends)
+    at_start, at_end = (end.at_form for end in ends)
+    before, after = touched
+    pinion = jnp.select([ahead & ~at_start, behind & at_end], [before, after], contact.pinion_roll_length(on_path))
+    wheel = jnp.select([behind & ~at_end, ahead & at_start], [after, before], contact.wheel_roll_length(on_path))
+    return pinion, wheel
 
 
 class _Corner(NamedTuple):
     """A corner at the mate's flank: gap [um], its slope [um/mm] and the roll length of the touched flank [mm]."""
 
-    gap: Float[Array, "..."]
-    slope: Float[Array, "..."]
-    touched: Float[Array, "..."]
+    gap: Real
+    slope: Real
+    touched: Real
 
 
-def _corner(x: Array, at_form: Array, lengths: Sequence[Array], tip_end: Sequence[Array], reach: Array) -> _Corner:
-    """The corner at a distance outside the path [mm], zero on it.
+def _corner(end: _End, edge_radius: Scalar) -> _Corner:
+    """The corners outside an end of the path; `edge_radius` is that of the tip there [mm]."""
+    tip, tip_base, rounding = map(end.at_contacts, (*end.lengths[:2], edge_radius))
 
-    Beyond `reach` the gap goes on along its tangent, so that far pairs stay finite and apart.
-
-    Args:
-        x: distance outside the path.
-        at_form: whether the path ends at the form circle of the mate, whose edge touches then.
-        lengths: of the tip corner and its mate, as `corner_gap` takes them.
-        tip_end: roll length at this end of the path of the gear whose tip is there, and radius of its tip edge.
-        reach: [mm].
-    """
-    near = jnp.clip(x, 0.0, reach)
-    (tip, tip_base, mate, mate_base), (tip_gear_end, edge_radius) = lengths, tip_end
-    chosen = [jnp.where(at_form, *both) for both in zip((mate, mate_base, tip_gear_end, tip_base), lengths)]
-    # one number at every point each: a derivative then sums over the points once
-    chosen = [jnp.broadcast_to(length, x.shape) for length in chosen]
-    tip, tip_base, rounding, form = (jnp.broadcast_to(each, x.shape) for each in (tip, tip_base, edge_radius, at_form))
-
-    def touching(t: Array) -> tuple[Array, Array]:
-        gap, touched = corner_gap(jnp.where(form, -t, t), *chosen)
+    def touching(x: Real) -> tuple[Real, Real]:
+        gap, touched = end.touching(x)
         past = jnp.maximum(touched**2 - tip**2, 0.0) / (2 * tip_base)  # the tip, along the flank
         opened = 1e3 * (jnp.sqrt(past**2 + rounding**2) - rounding)
-        return jnp.where(form, gap + opened, gap), jnp.where(form, jnp.minimum(touched, tip), touched)
+        return jnp.where(end.at_form, gap + opened, gap), end.on_flank(touched)
 
+    near, beyond = end.near, end.outside > 0
     (gap, touched), (slope, _) = jax.jvp(touching, (near,), (jnp.ones_like(near),))
-    outside = x > 0
-    gap = gap + slope * (jnp.maximum(x, reach) - reach)
-    return _Corner(jnp.where(outside, gap, 0.0), jnp.where(outside, slope, 0.0), touched)
+    gap = gap + slope * (jnp.maximum(end.outside, end.reach) - end.reach)
+    return _Corner(jnp.where(beyond, gap, 0.0), jnp.where(beyond, slope, 0.0), touched)
 
 
-def sides(pair: GearPair, contact: PathOfContact, points: Contacts) -> tuple[Side, Side]:
-    """Pinion and wheel at given contacts."""
+def sides(pair: GearPair, contact: PathOfContact, pinion: Real, wheel: Real) -> tuple[Side, Side]:
+    """Pinion and wheel with contacts at given roll lengths [mm]."""
     on_pinion, on_wheel = pair.face_middles
     return (
         Side(
             pair.pinion,
             contact.pinion_roll_length(contact.start),
             contact.pinion_pitch_roll_length,
-            points.pinion_roll_length,
+            pinion,
             on_pinion,
             pair.face_width,
         ),
@@ -381,7 +424,7 @@ def sides(pair: GearPair, contact: PathOfContact, points: Contacts) -> tuple[Sid
             pair.wheel,
             contact.wheel_roll_length(contact.end),
             contact.wheel_pitch_roll_length,
-            points.wheel_roll_length,
+            wheel,
             on_wheel,
             pair.face_width,
         ),
@@ -389,13 +432,9 @@ def sides(pair: GearPair, contact: PathOfContact, points: Contacts) -> tuple[Sid
 
 
 def kinematics(
-    pair: GearPair,
-    first_phase: Scalar,
-    resolution: Resolution,
-    plane: Plane,
-    outlines: tuple[Outline, Outline] | None = None,
+    pair: GearPair, first_phase: Scalar, resolution: Resolution, plane: Plane, contact: PathOfContact | None = None
 ) -> Kinematics:
-    """The kinematics of a pair; `outlines` of its gears where they are known."""
-    contact = path_of_contact(pair, outlines)
+    """The kinematics of a pair; `contact` is its path of contact where that is known."""
+    contact = path_of_contact(pair) if contact is None else contact
     helical = pair.pinion.helix_angle is not None
     return Kinematics(pair, contact, first_phase.astype(contact.start.dtype), resolution, plane, helical)

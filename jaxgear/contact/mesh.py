@@ -14,7 +14,7 @@ from ..compliance import AbstractCompliance, default_compliance
 from ..compliance.hertz import ContactGeometry, contact_geometry
 from ..compliance.plane import Plane, contact_plane
 from ..compliance.toothload import ToothLoad, tooth_load
-from ..geometry import GearPair, Margins, Outline, PathOfContact, explicit, margins_between, outline, path_of_contact
+from ..geometry import GearPair, Margins, Outline, PairGeometry, PathOfContact, explicit, pair_geometry
 from ..microgeometry import Flank
 from ..numerics import AbstractSpring, Given, SliceCoupling, changed, on_both, over_slices, program
 from ..numerics.programs import begin
@@ -34,32 +34,12 @@ from .status import Status, Statuses, status_of
 from .support import AbstractSupport
 
 
-class Gears(eqx.Module):
-    """Both gears, without any position of the mesh.
-
-    Attributes:
-        outlines: of their teeth.
-        margins: how far the pair is from what cannot run.
-    """
-
-    outlines: tuple[Outline, Outline]
-    margins: Margins
-
-
-# Programs of their own, so that little is compiled twice: the gears are the same for all numbers of positions and
+# Programs of their own, so that little is compiled twice: `pair_geometry` is the same for all numbers of positions and
 # slices, and the places of the contacts for all compliances.
 @program
-def _gears_of(pair: GearPair) -> Gears:
-    """Both gears of an `explicit` pair."""
-    outlines = on_both(outline, pair.pinion, pair.wheel)
-    path = path_of_contact(pair, outlines)
-    return Gears(outlines, margins_between(*outlines, path, pair.center_distance, pair.face_overlap))
-
-
-@program
-def _for_gears(compliance: AbstractCompliance, gears: Gears, count: int) -> AbstractCompliance:
+def _for_gears(compliance: AbstractCompliance, outlines: tuple[Outline, Outline], count: int) -> AbstractCompliance:
     """The compliance for these gears alone; `count` tooth pairs are carried along."""
-    return compliance.of_gears(*gears.outlines, count)
+    return compliance.of_gears(*outlines, count)
 
 
 Scalar = Float[Array, ""]
@@ -296,10 +276,10 @@ def _prepared(
 ) -> Any:
     """`prepare_from` by programs that `run` runs or begins; None where it begins nothing."""
     given = explicit(pair)
-    gears = run(_gears_of, given)
+    gears = run(pair_geometry, given)
     if gears is None:
         return None
-    known = run(_for_gears, compliance, gears, resolution.chosen_pairs)
+    known = run(_for_gears, compliance, gears.outlines, resolution.chosen_pairs)
     count, left = divmod(resolution.positions, _AT_ONCE)
     traced = any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves((first_phase, given, known, support)))
     if left or traced:
@@ -308,7 +288,7 @@ def _prepared(
     made = []
     for number in range(count):
         first = first_phase + number / resolution.positions if number else first_phase
-        places = run(_places_of, first, given, gears.outlines, sizes, contact_plane(compliance.plane), even)
+        places = run(_places_of, first, given, gears, sizes, contact_plane(compliance.plane), even)
         made.append(run(_arrays_of, places, gears.margins, known, support, even))
     mesh = made[0]
     if count > 1:
@@ -342,14 +322,14 @@ class _Places(eqx.Module):
 def _places_of(
     first_phase: Any,
     pair: GearPair,
-    outlines: tuple[Outline, Outline],
+    gears: PairGeometry,
     resolution: Resolution,
     plane: Plane,
     even: bool,
 ) -> _Places:
     """The places of an `explicit` pair in the sizes `of_arrays`; `plane` is that of the contact."""
-    moving = kinematics(pair, first_phase, resolution, plane, outlines)
-    path = moving.path_of_contact
+    outlines, path = gears.outlines, gears.path_of_contact
+    moving = kinematics(pair, first_phase, resolution, plane, path)
     points = contacts(pair, path, moving.contact_path, resolution.extended_contact)
     # what compliances know of are pairs at positions: of helical gears those of all slices
     rolls = [at.reshape(len(at), -1) for at in (points.pinion_roll_length, points.wheel_roll_length)]
@@ -358,7 +338,7 @@ def _places_of(
     outer = contacts(pair, path, beyond, resolution.extended_contact)
     return _Places(
         kinematics=moving,
-        sides=sides(pair, path, points),
+        sides=sides(pair, path, points.pinion_roll_length, points.wheel_roll_length),
         points=points,
         outer=outer,
         outer_steps=jnp.stack(

@@ -220,22 +220,18 @@ def loaded_material(
         return nothing_removed(mesh.resolution, torque.dtype)
     sizes = mesh.resolution
     prepared = _unlabelled(mesh, sizes.of_material)
+    first = slid_material(prepared, torque, pinion, wheel, _usual_load(prepared, torque), own)
     if not mesh.compliance.averages_over_loaded_width:
-        return slid_material(prepared, torque, pinion, wheel, own=own)
-    line_load, residual = first_contact(
-        slid_material(prepared, torque, pinion, wheel, _usual_load(prepared, torque), own)
-    )
+        return first
+    line_load, residual = first_contact(first)
     # once: what the loads of a second solution change is below the error of the model
     removed = slid_material(prepared, torque, pinion, wheel, line_load, own)
     known = _where_known(removed.amount, residual, max(_WIDTHS_KNOWN, sizes.rtol or 0.0))
     return RemovedMaterial(known, removed.shift, removed.relative_curvature)
 
 
-@program
-def _usual_load(mesh: Mesh, torque: Scalar) -> Load:
-    """Line load of contacts of unmodified flanks [N/mm]."""
-    sizes = mesh.resolution
-    return jnp.broadcast_to(usual_load(mesh, torque), (sizes.chosen_pairs, sizes.slices, sizes.positions))
+# by a program of its own: that of the removed material then is the same with the loads of a first solution
+_usual_load = program(usual_load)
 
 
 @program

@@ -165,10 +165,11 @@ def transverse_load_factors(
     pitch, form = _deviations(pair, quality_class, deviations)
     deviation = jnp.maximum(pitch, form) - pitch * real(run_in)
     moved = iso_stiffness(pair, load).mesh * deviation / (load * real(dynamic_factor) * real(face_load_factor))
-    along, total = path_of_contact(pair).contact_ratio, _total_contact_ratio(pair)
+    path = path_of_contact(pair)
+    along, total = path.contact_ratio, path.contact_ratio + pair.overlap_ratio
     above = jnp.maximum(total, 2.0)
     factor = (0.9 + 0.4 * jnp.sqrt(2 * (above - 1) / above) * moved) * jnp.minimum(total, 2.0) / 2
-    limits = along * contact_factor_squares(pair).contact_ratio, 0.25 * along + 0.75
+    limits = along * contact_factor_squares(pair, path).contact_ratio, 0.25 * along + 0.75
     return TransverseLoadFactors(*(jnp.clip(factor, 1.0, total / limit) for limit in limits))
 
 

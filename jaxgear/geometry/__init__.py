@@ -26,10 +26,12 @@ from .material import Material as Material
 from .outline import Outline as Outline
 from .outline import outline as outline
 from .pair import GearPair as GearPair
+from .pair import PairGeometry as PairGeometry
 from .pair import explain as explain
 from .pair import explicit as explicit
 from .pair import is_even as is_even
 from .pair import margins as margins
+from .pair import pair_geometry as pair_geometry
 from .pair import path_of_contact as path_of_contact
 from .path import PathOfContact as PathOfContact
 from .path import reduced_radius as reduced_radius

@@ -2,6 +2,7 @@
 
 import logging
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -9,7 +10,7 @@ from jaxtyping import Array, Bool, Float, PyTree
 
 from ..numerics import Checked, changed, concrete, number, on_both, program, real
 from .gear import Gear, with_diameters
-from .margins import Margins, faults_between, free_distance, margins_between, rounded_by
+from .margins import Margins, faults_between, free_distance, margins_between, play_between, rounded_by
 from .outline import Outline, outline
 from .path import PathOfContact, path_between, working_pressure_angle
 
@@ -74,7 +75,8 @@ class GearPair(Checked):
         distance, and what the mean tooth thickness allowances take off both teeth. Normal to the flanks it is
         cos(beta_b) times this.
         """
-        return margins(self).backlash
+        tangent = None if self.center_distance is None else jnp.tan(self.working_pressure_angle)
+        return play_between(self.pinion, self.wheel, tangent)
 
     @property
     def backlash_limits(self) -> Float[Array, "*pairs 2"]:
@@ -174,17 +176,43 @@ class GearPair(Checked):
         return self.wheel.teeth / self.pinion.teeth
 
 
+class PairGeometry(eqx.Module):
+    """A pair by its generated teeth.
+
+    Attributes:
+        outlines: of the teeth of pinion and wheel.
+        path_of_contact: points A to E.
+        margins: how far the pair is from what cannot run.
+        held: for each margin by name whether it holds.
+    """
+
+    outlines: tuple[Outline, Outline]
+    path_of_contact: PathOfContact
+    margins: Margins
+    held: dict[str, Bool[Array, ""]]
+
+
+@program
+def pair_geometry(pair: GearPair) -> PairGeometry:
+    """Outlines, path of contact and margins of an `explicit` pair.
+
+    Whoever makes a pair of concrete numbers runs this program to check it: it costs nothing to compile once more.
+    """
+    outlines = on_both(outline, pair.pinion, pair.wheel)
+    path = path_of_contact(pair, outlines)
+    known = margins_between(*outlines, path, pair.center_distance, pair.face_overlap)
+    return PairGeometry(outlines, path, known, known.held)
+
+
 def path_of_contact(pair: GearPair, outlines: tuple[Outline, Outline] | None = None) -> PathOfContact:
     """Path of contact of a pair, limited by tip and form circles; `outlines` of its gears where they are known."""
     forms = None if outlines is None else (outlines[0].form_roll_length, outlines[1].form_roll_length)
     return path_between(pair.pinion, pair.wheel, pair.center_distance, forms)
 
 
-@program
 def margins(pair: GearPair) -> Margins:
     """How far a pair is from what cannot run; finite and differentiable for impossible gears too."""
-    outlines = on_both(outline, pair.pinion, pair.wheel)
-    return margins_between(*outlines, path_of_contact(pair, outlines), pair.center_distance, pair.face_overlap)
+    return pair_geometry(explicit(pair)).margins
 
 
 def explain(pair: GearPair) -> tuple[str, ...]:
@@ -205,7 +233,8 @@ def explain(pair: GearPair) -> tuple[str, ...]:
 
 def _unrounded(pair: GearPair, center_distance: Scalar) -> Scalar:
     """The centre distance, or the backlash-free one where it is less by no more than its digits are rounded."""
-    known, held = _held(explicit(pair))
+    known = pair_geometry(explicit(pair))
+    held = known.held
     if _traced(known) or held["backlash"] or not held["base_circle_clearance"]:
         return center_distance
     given, free = float(center_distance), float(_free_distance(pair.pinion, pair.wheel))
@@ -226,10 +255,10 @@ _free_distance = program(free_distance)
 def _faults(pair: GearPair) -> tuple[str, ...]:
     if _traced(pair):
         return ()
-    known, held = _held(explicit(pair))
+    known = pair_geometry(explicit(pair))
     if _traced(known):  # within a trace of something else
         return ()
-    return faults_between(pair.pinion, pair.wheel, pair.center_distance, pair.axial_offset, known, held)
+    return faults_between(pair.pinion, pair.wheel, pair.center_distance, pair.axial_offset, known.margins, known.held)
 
 
 def explicit(pair: GearPair) -> GearPair:
@@ -249,9 +278,3 @@ def is_even(pair: GearPair) -> bool:
 
 def _traced(tree: PyTree) -> bool:
     return any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves(tree))
-
-
-@program
-def _held(pair: GearPair) -> tuple[Margins, dict[str, Bool[Array, ""]]]:
-    known = margins(pair)
-    return known, known.held

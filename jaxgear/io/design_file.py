@@ -13,6 +13,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ..compliance import AbstractCompliance
+from ..compliance.iso_6336 import single_stiffness
 from ..conditions import LoadSpectrum
 from ..contact import Mesh, OperatingPoint, Resolution, begin_contact, fewest_pairs, prepare
 from ..contact.contact_width import full_load
@@ -21,7 +22,6 @@ from ..metrics.findings import LIMITS
 from ..microgeometry import AbstractModification
 from ..numerics import program
 from ..shafts import AbstractSupport, Misalignment, RigidSupport, ShaftSupport
-from ..sizing import iso_stiffness
 from . import gearbox
 from .errors import DesignFileError, naming, printable, refused
 from .flanks import check_files
@@ -386,7 +386,7 @@ class DesignFile:
 def _single_deflection(pair: GearPair, torque) -> Float[Array, ""]:
     """Deflection of one pair of teeth that carries the torque [N m] alone, after ISO 6336-1 [um]."""
     line_load = full_load(pair, torque)
-    return line_load / iso_stiffness(pair, line_load).single
+    return line_load / single_stiffness(pair, line_load)[1]
 
 
 def load_design(path: str | Path) -> DesignFile:

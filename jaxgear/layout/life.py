@@ -23,7 +23,7 @@ from jaxtyping import Array, Float, Int8
 
 from ..conditions import LoadSpectrum
 from ..contact.status import Status, WithStatus, reason, status_of
-from ..geometry import GearPair
+from ..geometry import GearPair, path_of_contact
 from ..metrics.safety import Mode, Strength, damage_per_cycle
 from ..metrics.stress import nominal_stress_squares, single_contact_root_stress
 from ..numerics import Checked, Numbers, concrete, kernel, maximum, program, real, result, whole
@@ -183,7 +183,8 @@ def summed(pair: GearPair, found: Loaded, load: LoadSpectrum, strength: Strength
     # without torque teeth carry nothing, whether the place of the shafts has been found or not
     carries = load.torques > 0
     largest, factor = jnp.where(carries, found.largest, 0.0), jnp.where(carries, found.factor, 1.0)
-    contact, root = nominal_stress_squares(pair), single_contact_root_stress(pair)
+    path = path_of_contact(pair)
+    contact, root = nominal_stress_squares(pair, path), single_contact_root_stress(pair, path)
     mean = largest / factor
     # K_Fbeta of an even load; below 1 is rounding
     bent = mean * root_face_load_factor(jnp.maximum(factor, 1.0), pair.face_width, tooth_height(pair))

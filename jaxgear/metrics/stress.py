@@ -22,7 +22,7 @@ from jaxtyping import Array, Float
 
 from ..compliance.plane import combined_modulus
 from ..contact import MeshCycle, Side
-from ..geometry import Gear, GearPair, path_of_contact
+from ..geometry import Gear, GearPair, PathOfContact
 from ..geometry.gear import virtual_gear
 from ..geometry.involute import load_angle
 from ..geometry.outline import Curves, curves, rack_tip
@@ -57,14 +57,16 @@ def nominal_contact_stress(cycle: MeshCycle) -> ContactStress:
     """
     pair = cycle.kinematics.pair
     line_load = cycle.force / pair.face_width * over_several_slices(face_load_factor, cycle)
-    return ContactStress(*(safe_sqrt(line_load * square) for square in nominal_stress_squares(pair)))
+    return ContactStress(
+        *(safe_sqrt(line_load * square) for square in nominal_stress_squares(pair, cycle.kinematics.path_of_contact))
+    )
 
 
-def nominal_stress_squares(pair: GearPair) -> tuple[Scalar, Scalar]:
+def nominal_stress_squares(pair: GearPair, path: PathOfContact) -> tuple[Scalar, Scalar]:
     """Squares of `nominal_contact_stress` per line load along the line of action, pinion and wheel [MPa^2 mm/N]."""
-    factors = contact_factor_squares(pair)
+    factors = contact_factor_squares(pair, path)
     normal = factors.contact_ratio * factors.elasticity * factors.helix_angle * jnp.cos(pair.pinion.base_helix_angle)
-    at_pitch = normal / path_of_contact(pair).reduced_radius(jnp.zeros(()))
+    at_pitch = normal / path.reduced_radius(jnp.zeros(()))
     return at_pitch * factors.pinion_single_pair, at_pitch * factors.wheel_single_pair
 
 
@@ -87,21 +89,20 @@ class ContactFactors(NamedTuple):
     wheel_single_pair: Scalar
 
 
-def contact_factor_squares(pair: GearPair) -> ContactFactors:
+def contact_factor_squares(pair: GearPair, path: PathOfContact) -> ContactFactors:
     """The factors of `nominal_contact_stress` that belong to a pair, whatever its load."""
-    contact = path_of_contact(pair)
     overlap = jnp.minimum(pair.overlap_ratio, 1.0)
-    pitch = contact.reduced_radius(jnp.zeros(()))
-    inner, outer = (pitch / contact.reduced_radius(single) for single in (contact.inner_single, contact.outer_single))
+    pitch = path.reduced_radius(jnp.zeros(()))
+    inner, outer = (pitch / path.reduced_radius(single) for single in (path.inner_single, path.outer_single))
     inner, outer = (jnp.maximum(single, 1.0) for single in (inner, outer))
     if pair.pinion.helix_angle is not None:
         inner, outer = ((1 + (1 - overlap) * (jnp.sqrt(square) - 1)) ** 2 for square in (inner, outer))
     cosine = jnp.cos(pair.pinion.transverse_pressure_angle)
-    sharing = jnp.maximum(4 - contact.contact_ratio, 0.0) / 3
+    sharing = jnp.maximum(4 - path.contact_ratio, 0.0) / 3
     return ContactFactors(
         zone=2 * jnp.cos(pair.pinion.base_helix_angle) / (cosine**2 * jnp.tan(pair.working_pressure_angle)),
         elasticity=combined_modulus(pair.pinion.material, pair.wheel.material, "strain") / jnp.pi,
-        contact_ratio=sharing * (1 - overlap) + overlap / contact.contact_ratio,
+        contact_ratio=sharing * (1 - overlap) + overlap / path.contact_ratio,
         helix_angle=1 / pair.pinion.helix_cosine,
         pinion_single_pair=inner,
         wheel_single_pair=outer,
@@ -226,12 +227,11 @@ def _per_load(gear: Gear, factors: RootFactors) -> Real:
     return factors.form * factors.correction * jnp.cos(gear.transverse_pressure_angle) / gear.module
 
 
-def single_contact_factors(pair: GearPair) -> tuple[RootFactors, RootFactors]:
+def single_contact_factors(pair: GearPair, path: PathOfContact) -> tuple[RootFactors, RootFactors]:
     """Y_F and Y_S of pinion and wheel at their outer points of single contact, for contact ratios to 2.
 
     Of helical gears that point is the one of the virtual gears, whose contact ratio is eps_alpha / cos(beta_b)^2.
     """
-    path = path_of_contact(pair)
     if pair.pinion.helix_angle is None:
         gears = pair.gears
         rolls = path.pinion_roll_length(path.outer_single), path.wheel_roll_length(path.inner_single)
@@ -252,10 +252,10 @@ def root_helix_factor(pair: GearPair) -> Scalar:
     return 1 - jnp.minimum(pair.overlap_ratio, 1.0) * angle / _OBLIQUE
 
 
-def single_contact_root_stress(pair: GearPair) -> tuple[Scalar, Scalar]:
+def single_contact_root_stress(pair: GearPair, path: PathOfContact) -> tuple[Scalar, Scalar]:
     """cos(alpha_t) / m_n Y_F Y_S Y_beta of pinion and wheel [MPa mm/N] at their outer points of single contact."""
     helix = root_helix_factor(pair)
-    pinion, wheel = (_per_load(*each) * helix for each in zip(pair.gears, single_contact_factors(pair)))
+    pinion, wheel = (_per_load(*each) * helix for each in zip(pair.gears, single_contact_factors(pair, path)))
     return pinion, wheel
 
 
@@ -268,7 +268,9 @@ def nominal_root_stress(cycle: MeshCycle) -> NominalRootStress:
     """
     pair = cycle.kinematics.pair
     line_load = cycle.force / pair.face_width * over_several_slices(root_face_load_factor, cycle)
-    return NominalRootStress(*(line_load * share for share in single_contact_root_stress(pair)))
+    return NominalRootStress(
+        *(line_load * share for share in single_contact_root_stress(pair, cycle.kinematics.path_of_contact))
+    )
 
 
 @over_batch
@@ -298,9 +300,9 @@ def rating_factors(cycle: MeshCycle) -> dict[str, Float[Array, ""]]:
     References:
         ISO 6336-2 clauses 6 and 7, ISO 6336-3 clauses 5 to 7 (Method B).
     """
-    pair = cycle.kinematics.pair
+    pair, path = cycle.kinematics.pair, cycle.kinematics.path_of_contact
     module, cosine = pair.pinion.module, jnp.cos(pair.pinion.transverse_pressure_angle)
-    squares = contact_factor_squares(pair)
+    squares = contact_factor_squares(pair, path)
     one = jnp.ones_like(module)
     face, root_face = (one * over_several_slices(of, cycle) for of in (face_load_factor, root_face_load_factor))
     zone, elasticity, sharing, helix, *single = map(safe_sqrt, squares)
@@ -322,7 +324,7 @@ def rating_factors(cycle: MeshCycle) -> dict[str, Float[Array, ""]]:
     for name, factor in zip(("pinion", "wheel"), single):
         found[f"{name}_single_pair_contact_factor"] = factor
         found[f"{name}_contact_stress_MPa"] = pitting * factor * safe_sqrt(face)
-    for name, factors in zip(("pinion", "wheel"), single_contact_factors(pair)):
+    for name, factors in zip(("pinion", "wheel"), single_contact_factors(pair, path)):
         bending = tangential / (pair.face_width * module) * factors.form * factors.correction * root_helix
         found[f"{name}_form_factor"] = factors.form
         found[f"{name}_stress_correction_factor"] = factors.correction

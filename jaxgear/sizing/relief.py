@@ -9,8 +9,9 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..compliance import iso_stiffness
+from ..compliance.iso_6336 import single_stiffness
 from ..contact import MeshCycle
-from ..geometry import GearPair, path_of_contact
+from ..geometry import GearPair, PathOfContact, path_of_contact
 from ..metrics import secant_stiffness
 from ..microgeometry import AbstractCurve, TipRelief
 from ..numerics import Given, check, minimum, real, safe_divide
@@ -18,11 +19,15 @@ from ..numerics import Given, check, minimum, real, safe_divide
 Scalar = Float[Array, ""]
 
 
-def long_relief_length(pair: GearPair) -> Scalar:
+def long_relief_length(pair: GearPair, path: PathOfContact | None = None) -> Scalar:
     """Roll length of the double-contact zone, p_b (eps_alpha - 1) [mm]: from the outer point of single contact to the
     tip, in any transverse section of a helical pair.
+
+    Args:
+        pair: gear pair.
+        path: its path of contact where it is known.
     """
-    path = path_of_contact(pair)
+    path = path_of_contact(pair) if path is None else path
     return path.base_pitch * (path.contact_ratio - 1)
 
 
@@ -43,7 +48,7 @@ def relief_amount(pair: GearPair, torque: Given, application_factor: Given = 1.0
         application_factor: K_A.
     """
     line_load = _line_load(pair, torque, application_factor)
-    return _over(line_load, iso_stiffness(pair, line_load).single)
+    return _over(line_load, single_stiffness(pair, line_load)[1])
 
 
 def effective_relief(
@@ -115,11 +120,16 @@ def dynamic_relief(cycle: MeshCycle, internal_force: Given = 0.0, external_force
 
 
 def iso_relief(
-    pair: GearPair, torque: Given, *, curve: AbstractCurve | None = None, application_factor: Given = 1.0
+    pair: GearPair,
+    torque: Given,
+    *,
+    curve: AbstractCurve | None = None,
+    application_factor: Given = 1.0,
+    path: PathOfContact | None = None,
 ) -> TipRelief:
     """Rule-based long tip relief: `relief_amount` over `long_relief_length`, for the tip of either gear."""
     shape = {} if curve is None else {"curve": curve}
-    return TipRelief(relief_amount(pair, torque, application_factor), long_relief_length(pair), **shape)
+    return TipRelief(relief_amount(pair, torque, application_factor), long_relief_length(pair, path), **shape)
 
 
 def _line_load(pair: GearPair, torque: Given, application_factor: Given) -> Scalar:

@@ -6,7 +6,7 @@ import jax
 import numpy as np
 
 from ..contact import Mesh, prepare
-from ..geometry import GearPair
+from ..geometry import GearPair, PathOfContact, explicit, pair_geometry
 from ..io import DesignFile, Search
 from ..io.optimize_table import METHODS_WITHOUT_VARIABLES, optimize_of
 from ..microgeometry import AbstractModification, NoModification
@@ -37,12 +37,14 @@ def first_mesh(design: DesignFile, torque: float, *, quick: bool) -> Mesh:
 
 def rule_based(design: DesignFile) -> AbstractModification:
     """The relief of ISO 6336-1 for both tips."""
-    return _iso_relief(design.pair(), np.asarray(design.torque), np.asarray(optimize_of(design).application_factor))
+    pair, factor = design.pair(), optimize_of(design).application_factor
+    path = pair_geometry(explicit(pair)).path_of_contact
+    return _iso_relief(pair, path, np.asarray(design.torque), np.asarray(factor))
 
 
 @program
-def _iso_relief(pair: GearPair, torque, application_factor):
-    return iso_relief(pair, torque, application_factor=application_factor)
+def _iso_relief(pair: GearPair, path: PathOfContact, torque, application_factor):
+    return iso_relief(pair, torque, application_factor=application_factor, path=path)
 
 
 def compared(

@@ -1,7 +1,6 @@
 """The geometry of a pair as an engineer lists it, and as a drawing says it."""
 
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import Any
 
 import jax
@@ -9,12 +8,12 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from ..geometry import Gear, GearPair, PathOfContact, diameter, margins, outline, path_of_contact
+from ..geometry import Gear, GearPair, Outline, PairGeometry, PathOfContact, diameter, explicit, pair_geometry
 from ..geometry.gear import has_full_radius, tool_name
 from ..io import DesignFile
 from ..io.tolerance_table import quality_classes
 from ..manufacture import measures
-from ..numerics import Given, program
+from ..numerics import Given, changed, program
 from ..report import Chapter, Table, heading, text
 from ..tolerance import ToleranceClass, iso_rounded
 
@@ -91,7 +90,8 @@ def numbers(
     upper = gear.tooth_thickness_allowance
 
     def measured(allowance):
-        thick = replace(gear, tooth_thickness_allowance=allowance, tooth_thickness_tolerance=jnp.zeros_like(allowance))
+        zero = jnp.zeros_like(allowance)
+        thick = changed(gear, tooth_thickness_allowance=allowance, tooth_thickness_tolerance=zero)  # unchecked
         return measures(thick, teeth, ball)
 
     of = jax.vmap(measured)(jnp.stack([upper, upper - gear.tooth_thickness_tolerance]))
@@ -194,7 +194,7 @@ def gears(file: DesignFile) -> dict[str, dict[str, dict[str, Any]]]:
     # gears without backlash have it up to rounding, which is no -0
     choices = chosen(file)
     pair = file.pair()
-    shape, drawn = _numbers(pair, choices)
+    shape, drawn = _numbers(pair, pair_geometry(explicit(pair)), choices)
     helical = not pair.is_spur
     pinion, wheel, together = jax.tree.map(lambda number: np.where(np.abs(number) < 1e-9, 0.0, number), shape)
     geometry = {
@@ -228,22 +228,24 @@ def mounting(file: DesignFile) -> str:
 
 
 @program
-def _numbers(pair: GearPair, choices):
-    contact, room = path_of_contact(pair), margins(pair)
+def _numbers(pair: GearPair, geometry: PairGeometry, choices):
+    contact, room = geometry.path_of_contact, geometry.margins
     pitch = contact.pinion_pitch_roll_length, contact.wheel_pitch_roll_length
     active = (
         (contact.pinion_roll_length(contact.start), contact.pinion_roll_length(contact.end)),
         (contact.wheel_roll_length(contact.end), contact.wheel_roll_length(contact.start)),
     )
     shape = (
-        _gear(pair.pinion, pitch[0], active[0], room.pinion_tip_clearance),
-        _gear(pair.wheel, pitch[1], active[1], room.wheel_tip_clearance),
+        _gear(pair.pinion, geometry.outlines[0], pitch[0], active[0], room.pinion_tip_clearance),
+        _gear(pair.wheel, geometry.outlines[1], pitch[1], active[1], room.wheel_tip_clearance),
         _together(pair, contact, room.backlash),
     )
     return shape, [numbers(gear, *given) for gear, given in zip(pair.gears, choices)]
 
 
-def _gear(gear: Gear, pitch: Scalar, active: tuple[Scalar, Scalar], tip_clearance: Scalar) -> tuple[Scalar, ...]:
+def _gear(
+    gear: Gear, outline: Outline, pitch: Scalar, active: tuple[Scalar, Scalar], tip_clearance: Scalar
+) -> tuple[Scalar, ...]:
     """`_GEAR` and `_HELICAL_GEAR`, of the roll lengths at the pitch point and the ends of the active profile [mm]."""
     helical = (
         ()
@@ -269,7 +271,7 @@ def _gear(gear: Gear, pitch: Scalar, active: tuple[Scalar, Scalar], tip_clearanc
         2 * gear.tip_radius,
         2 * gear.tip_form_radius,
         2 * gear.root_circle_radius,
-        diameter(gear, outline(gear).form_roll_length),
+        diameter(gear, outline.form_roll_length),
         *(diameter(gear, end) for end in active),
         2 * gear.bore_radius,
         gear.tip_land,
