@@ -9,7 +9,6 @@ import threading
 import time
 from dataclasses import replace
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -133,9 +132,6 @@ def test_finer_meshes_and_other_compliances_compile_what_is_new_alone(shelf, tra
     assert traced[begun:] == ["_for_gears", "_arrays_of", "_joined"]
     monkeypatch.setattr(mesh_module, "_AT_ONCE", 128)  # all positions in one run of the programs
     whole = jg.prepare(pair, resolution=fine)
-    # steps of the edge pairs, which the status alone reads, differ from one to the next beyond the path of contact
-    np.testing.assert_allclose(made.outer_steps, whole.outer_steps, rtol=0.05)
-    made, whole = (eqx.tree_at(lambda mesh: mesh.outer_steps, mesh, 0.0) for mesh in (made, whole))
     for one, other in zip(jax.tree.leaves(made), jax.tree.leaves(whole), strict=True):
         np.testing.assert_allclose(one, other, rtol=1e-9, atol=1e-12)
 

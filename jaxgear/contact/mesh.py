@@ -63,8 +63,8 @@ class Mesh(eqx.Module):
         outer_gap: transmission error at which the pairs behind and ahead of those carried along touch if they are not
             modified [um], shape (2, positions).
         outer_lever: lever of these outer pairs, shape (2, positions).
-        outer_steps: distance of the contacts of the outer pairs from those of the first and last pair, in steps of the
-            latter from one position to the next, shape (2, positions).
+        outer_roll_length: of these outer pairs, of the one behind on the pinion and of the one ahead on the wheel [mm],
+            shape (2, positions).
         structure: compliance of both gears under a load that is uniform over the common face, the mean over that face,
             (pairs, pairs, positions) [um per N/mm]; of helical gears whose slices are not coupled that of every slice.
         law: prepared contact law.
@@ -94,7 +94,7 @@ class Mesh(eqx.Module):
     margins: Margins
     outer_gap: Float[Array, "2 *slices positions"]
     outer_lever: Float[Array, "2 *slices positions"]
-    outer_steps: Float[Array, "2 *slices positions"]
+    outer_roll_length: Float[Array, "2 *slices positions"]
     structure: Float[Array, "pairs pairs *own positions"]
     law: AbstractSpring
     width_factor: Field
@@ -301,7 +301,7 @@ class _Places(eqx.Module):
     """All of a mesh that does not depend on its compliance.
 
     Attributes:
-        kinematics, sides, outer_steps: as of the mesh.
+        kinematics, sides: as of the mesh.
         points, outer: contacts of the pairs carried along, and of those behind and ahead of them.
         loads: on pinion and wheel, fields of shape (pairs, positions), of helical gears those of all slices in a row.
         contact: flanks at the contacts.
@@ -312,7 +312,6 @@ class _Places(eqx.Module):
     sides: tuple[Side, Side]
     points: Contacts
     outer: Contacts
-    outer_steps: Float[Array, "2 *slices positions"]
     loads: tuple[ToothLoad, ToothLoad]
     contact: ContactGeometry
     spreading: Spreading
@@ -341,12 +340,6 @@ def _places_of(
         sides=sides(pair, path, points.pinion_roll_length, points.wheel_roll_length),
         points=points,
         outer=outer,
-        outer_steps=jnp.stack(
-            [
-                _steps(points.pinion_roll_length[-1, ..., :2], outer.pinion_roll_length[0]),
-                _steps(points.wheel_roll_length[0, ..., :-3:-1], outer.wheel_roll_length[1]),
-            ]
-        ),
         loads=(pinion, wheel),
         contact=contact_geometry(pinion, wheel, plane, pair.face_width),
         spreading=spreading_of(pair, outlines, resolution, even),
@@ -382,7 +375,7 @@ def _arrays_of(
         margins=margins,
         outer_gap=closing(places.outer),
         outer_lever=places.outer.lever,
-        outer_steps=places.outer_steps,
+        outer_roll_length=jnp.stack([places.outer.pinion_roll_length[0], places.outer.wheel_roll_length[1]]),
         structure=structures[0] + structures[1],
         law=law,
         width_factor=width_factor,
@@ -395,15 +388,6 @@ def _arrays_of(
         support_status=None if support is None else support.status,
         even=even,
     )
-
-
-def _steps(
-    edge: Float[Array, "*slices 2"], beyond: Float[Array, "*slices positions"]
-) -> Float[Array, "*slices positions"]:
-    edge, beyond = jax.lax.stop_gradient((edge, beyond))
-    first = edge[..., :1]
-    one = jnp.maximum(jnp.abs(first - edge[..., 1:]), 1e-6 * first)
-    return jnp.abs(beyond - first) / one
 
 
 class Sizes(TypedDict, total=False):
@@ -489,7 +473,6 @@ def _part(first: Array | np.ndarray, count: int, mesh: Mesh) -> Mesh:
     moving = mesh.kinematics
     positions = moving.resolution.positions
     taken = jax.tree.map(take, _by_position(mesh))
-    taken[0] = taken[0] / count  # as far out, over larger steps
     phase = moving.first_phase + first.astype(moving.first_phase.dtype) / positions
     resolution = changed(moving.resolution, positions=positions // count)
     moved = replace(moving, first_phase=phase, resolution=resolution)
@@ -503,9 +486,7 @@ def _joined(parts: list[list[Array | AbstractSpring]]) -> list[Array | AbstractS
     def join(*leaves: Array) -> Array:
         return jnp.stack(leaves, axis=-1).reshape(*leaves[0].shape[:-1], -1)
 
-    found = jax.tree.map(join, *parts)
-    found[0] = found[0] * len(parts)  # as far out, over smaller steps
-    return found
+    return jax.tree.map(join, *parts)
 
 
 def _by_position(mesh: Mesh) -> list[Array | AbstractSpring]:
@@ -527,9 +508,9 @@ def _by_slice(mesh: Mesh) -> list[Array | AbstractSpring]:
 
 def _by_contact(mesh: Mesh) -> list[Array | AbstractSpring]:
     return [
-        mesh.outer_steps,
         mesh.outer_gap,
         mesh.outer_lever,
+        mesh.outer_roll_length,
         mesh.corner_gap,
         mesh.lever,
         mesh.law,

@@ -404,11 +404,23 @@ def outermost(mesh: Mesh, removed: RemovedMaterial) -> Curve:
     amount, gain = removed.amount, _sliding_gain(mesh, removed.shift)
     edge = jnp.stack([amount[-1, :, 0], amount[0, :, -1]])
     fall = jnp.minimum(edge - jnp.stack([amount[-1, :, 1], amount[0, :, -2]]), 0.0)
-    gap, lever, steps = map(over_slices, (mesh.outer_gap, mesh.outer_lever, mesh.outer_steps))
-    left = (edge - 2 * gain)[..., None] + fall[..., None] * steps
+    gap, lever = map(over_slices, (mesh.outer_gap, mesh.outer_lever))
+    left = (edge - 2 * gain)[..., None] + fall[..., None] * _outer_steps(mesh)
     if mesh.support_gap is not None:
         left = left + lever * mesh.support_gap[None, :, None]
     return jnp.min(gap + left / lever, axis=(0, 1))
+
+
+def _outer_steps(mesh: Mesh) -> Float[Array, "2 #slices positions"]:
+    """Distance of the outer contacts from the last one where it begins and the first one where it ends the base pitch,
+    in steps of the latter from one position to the next.
+    """
+    pinion, wheel = (side.contact_roll_length for side in mesh.sides)
+    second = min(1, mesh.resolution.positions - 1)  # of a single position there is no step, and nothing falls
+    edges = [(pinion[-1, ..., 0], pinion[-1, ..., second]), (wheel[0, ..., -1], wheel[0, ..., -1 - second])]
+    first, next_one = (over_slices(jnp.stack(each)[..., None]) for each in zip(*edges))
+    one = jnp.maximum(jnp.abs(first - next_one), 1e-6 * first)
+    return jax.lax.stop_gradient(jnp.abs(over_slices(mesh.outer_roll_length) - first) / one)
 
 
 def _sliding_gain(mesh: Mesh, shift) -> Float[Array, "2 slices"]:
