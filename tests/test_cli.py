@@ -190,7 +190,8 @@ def test_designs_of_a_file_with_tolerances_are_manufactured(folder, analyzed):
     file = load_design(folder / "fixed.toml")
     pinion, wheel = file.design({})
     tolerance = jg.Tolerance.from_class(file.pair(), 5).without_lead()
-    wanted = {"torque": 50.0, "pinion": pinion, "wheel": wheel, "tolerance": tolerance, "samples": 8, "seed": 0}
+    gears = jg.ManufacturedGears(tolerance, 8)
+    wanted = {"torque": 50.0, "pinion": pinion, "wheel": wheel, "manufactured": gears}
     asked, scatter = analyzed.made[1]
     assert asked.keys() == wanted.keys() and eqx.tree_equal(asked, wanted)
     found = analyzed.summary["designs"]["modified"]["manufactured"]
@@ -457,8 +458,8 @@ def test_a_quick_run_is_coarse_and_short(folder, tmp_path, monkeypatch):
     class Searched(Exception):
         pass
 
-    def search(design, bounds, **options):
-        asked.update(options, bounds=bounds)
+    def search(problem, **options):
+        asked.update(options, problem=problem)
         raise Searched
 
     monkeypatch.setattr(importlib.import_module("jaxgear.io.optimize_table"), "minimize", search)
@@ -467,10 +468,9 @@ def test_a_quick_run_is_coarse_and_short(folder, tmp_path, monkeypatch):
     path.write_text(FREE.replace("positions = 16", "positions = 4096"))
     with pytest.raises(Searched), jax.numpy_dtype_promotion("standard"), jax.numpy_rank_promotion("allow"):
         main(["optimize", str(path), "--quick", "--no-figures", "-o", str(tmp_path / "out")])
-    assert (
-        asked["method"] == jg.optimize.SLP(starts=4, rounds=1, steps=10) and float(asked["torque"].torques[0]) == 50.0
-    )
-    assert asked["bounds"] == {"height": (0.0, 20.0)} and asked["mesh"].resolution.positions == 16
+    problem = asked["problem"]
+    assert asked["method"] == jg.optimize.SLP(starts=4, rounds=1, steps=10) and float(problem.cases.torque[0]) == 50.0
+    assert problem.bounds == {"height": (0.0, 20.0)} and problem.mesh.resolution.positions == 16
     assert not (tmp_path / "out").exists()
 
 
@@ -535,11 +535,11 @@ def test_what_cannot_be_meshed_is_not_verified(tmp_path, not_searched):
     asked.write_text(thin.replace("starts = 2", "verify = true\nstarts = 2"))
     result = call("optimize", asked, "-o", tmp_path / "asked")
     assert result.code == 2 and "searching" not in result.err and not (tmp_path / "asked").exists()
-    assert "asked.toml: optimize.verify: finite_element_compliance: bore_diameter leaves a rim of" in result.err
+    assert "asked.toml: optimize.verify: bore_diameter leaves a rim of" in result.err
     open_ = tmp_path / "open.toml"
     open_.write_text(thin)
     result = call("optimize", open_, "-m", "te_iteration", "-o", tmp_path / "open", "--no-figures")
-    assert "\nnot verified by finite elements: finite_element_compliance: bore_diameter leaves a rim of" in result.out
+    assert "\nnot verified by finite elements: bore_diameter leaves a rim of" in result.out
     designs = json.loads((tmp_path / "open" / "summary.json").read_text())["designs"]
     assert not any("verified" in design for design in designs.values())
 

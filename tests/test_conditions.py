@@ -69,7 +69,7 @@ def test_one_quantile_in_every_engine(tolerance):
     table = jg.sweep(mesh, 50.0, design, plan, measures=measures, manufactured=made)
     assert table.results == ("ppte_um_q95", "ppte_um_cvar50")
     bounds = {"amount": (0.0, 10.0)}
-    problem = Problem(mesh, 50.0, design, bounds, measure=jg.Quantile(0.95), manufactured=made)
+    problem = jg.Problem(mesh, 50.0, design, bounds, measure=jg.Quantile(0.95), manufactured=made)
     searched = float(jax.jit(lambda x: problem.score(x).value[0])(jnp.asarray([AMOUNT / 10])))
     expected = float(hdquantiles(np.asarray(scatter.ppte), [0.95])[0])
     assert np.ptp(scatter.ppte) > 0.1

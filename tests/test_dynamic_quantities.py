@@ -188,9 +188,9 @@ def test_many_designs_are_each_as_alone(mesh, of_contacts):
 
 def test_designs_have_one_leading_axis():
     for designs in (1.0, (jnp.ones(2), jnp.ones(3)), jnp.ones(0)):
-        with pytest.raises(ValueError, match="^design_runs: designs must be arrays with one leading axis"):
+        with pytest.raises(ValueError, match="^designs must be arrays with one leading axis"):
             SETTINGS.runs_of(lambda design: design, designs)
-    with pytest.raises(ValueError, match="^design_runs: steps must be given"):
+    with pytest.raises(ValueError, match="^steps must be given"):
         design_runs(lambda design: design, jnp.ones(2), [1000.0], {"up": Run()})
 
 

@@ -14,7 +14,7 @@ import jaxgear as jg
 from jaxgear import manufacture
 from jaxgear.contact import removed_material
 from jaxgear.geometry import tooth_thickness
-from jaxgear.tolerance import Tolerance, ToleranceClass, deviated_material
+from jaxgear.tolerance import ManufacturedGears, Tolerance, ToleranceClass, deviated_material
 
 GEARS = {
     beta: jg.Gear(

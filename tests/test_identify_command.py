@@ -56,7 +56,7 @@ class Search:
         monkeypatch.setattr("jaxgear.studies.results.gears", lambda design: {})  # which other tests compile
         monkeypatch.setattr(DesignFile, "mesh", lambda self, size: kinematics(self.pair(), real(0.0), size, "strain"))
 
-    def __call__(self, design, prior, measurement, **asked):
+    def __call__(self, mesh, measurement, design, prior, **asked):
         self.asked = asked
         left = 0.3 * np.cos(4 * np.pi * measurement.phase)  # the second mesh order
         own = len(prior) + 1

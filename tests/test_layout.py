@@ -416,7 +416,7 @@ def test_flank_lines_are_varied_together_with_the_profiles(monkeypatch):
     """All combinations, and the one chosen has the further slope and crowning on the wheel beside the tip relief."""
     tried = {}
 
-    def table(design, plan, *, results, **others):
+    def table(mesh, torque, design, plan, *, results, **others):
         rows = np.asarray(plan.values)
         tried.update({row: design(dict(zip(plan.names, row))) for row in map(tuple, rows)})
         found = dict.fromkeys(results, np.ones(len(rows))) | dict(zip(plan.names, rows.T))

@@ -102,7 +102,7 @@ def test_limits_beside_an_objective_that_is_no_extreme_are_judged_at_four_times_
     """Its programs know no mesh half a position later; the largest pressure lies between twice the positions."""
     few = replace(LINE, positions=8)
     limit = jg.Constraint("max_flank_pressure", high=500.0)
-    posed = Problem(
+    posed = jg.Problem(
         jg.prepare(gear_pair(), resolution=few),
         50.0,
         design,

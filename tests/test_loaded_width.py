@@ -149,7 +149,7 @@ def test_batches_are_their_members(batch, cycle):
 @pytest.mark.slow
 def test_slopes_of_a_linearization_are_those_of_the_curve(mesh):
     """One gradient of the contact serves all positions: widths depend on the loads at their own position alone."""
-    problem = Problem(mesh, TORQUE, lambda x: tuple(reliefs(x["amount"]).values()), {"amount": (10.0, 20.0)})
+    problem = jg.Problem(mesh, TORQUE, lambda x: tuple(reliefs(x["amount"]).values()), {"amount": (10.0, 20.0)})
     (pieces,) = problem.linearize(jnp.asarray([0.5])).objectives
     slope = jax.jacfwd(lambda amount: error(mesh, amount, TORQUE))(15.0)
     np.testing.assert_allclose(pieces.slope[0, :, 0], 10 * slope, rtol=1e-8, atol=1e-10)

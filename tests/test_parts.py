@@ -105,7 +105,7 @@ def problem_on(mesh, objective="ppte"):
         return relief, relief
 
     limit = jg.Constraint("max_flank_pressure", high=900.0)
-    return Problem(mesh, TORQUE, design, BOX, objective=objective, constraints=[limit])
+    return jg.Problem(mesh, TORQUE, design, BOX, objective=objective, constraints=[limit])
 
 
 @pytest.fixture(scope="module")
