@@ -149,7 +149,7 @@ def test_repeated_it_finds_everything_there(folder):
     result = sweep(folder / "gear.toml", "-o", folder / "out")
     assert result.code == 0 and "resuming, 60 of 60 variants are complete" in result.err
     assert {path.name: path.stat().st_mtime_ns for path in (folder / "out" / "table").glob("part-*")} == before
-    other = sweep(folder / "out", "--samples", folder / "gear.toml", "-o")
+    other = sweep(folder / "gear.toml", "-o", folder / "out", "--samples", "61")
     assert_refused(other, "table: holds a sweep of other settings (plan, variants)")
 
 
