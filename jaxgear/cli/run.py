@@ -70,13 +70,15 @@ def run_study(
                 interrupt.note(f"all tables are complete in {target}{os.sep}, not all figures are drawn")
             found = _found(study, result, omitted)
             _show(found, stages)
-            files = []
+            if figures:
+                _without_windows()
             if asked is not None:
+                stages.begin("preparing the report")
                 facts = [*project_facts(design), *asked.facts, *versions().items()]
                 result = result.reported(folder, facts, figures=figures)
+            files = []
             if figures:
                 stages.begin("drawing the figures")
-                _without_windows()
                 files = save_figures(folder, result.figures())
             if asked is not None:
                 shown = dataclasses.replace(_found(study, result, omitted), figures=files)

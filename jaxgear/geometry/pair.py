@@ -196,7 +196,7 @@ class PairGeometry(eqx.Module):
 def pair_geometry(pair: GearPair) -> PairGeometry:
     """Outlines, path of contact and margins of an `explicit` pair.
 
-    Whoever makes a pair of concrete numbers runs this program to check it: it costs nothing to compile once more.
+    A pair of concrete numbers is checked by this program when it is made, so that it costs no further compilation.
     """
     outlines = on_both(outline, pair.pinion, pair.wheel)
     path = path_of_contact(pair, outlines)
