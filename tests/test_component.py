@@ -79,5 +79,5 @@ def test_it_maps_over_designs(model):
 
 
 def test_what_is_no_mesh_is_refused(mesh):
-    with pytest.raises(TypeError, match="ModifiedMesh: mesh is a GearPair, must be a Mesh: jaxgear.prepare makes one"):
+    with pytest.raises(TypeError, match="mesh is a GearPair, must be a Mesh: jaxgear.prepare makes one"):
         jg.ModifiedMesh(mesh.pair)

@@ -58,7 +58,7 @@ class Search:
         monkeypatch.setattr(DesignFile, "mesh", lambda self, size: kinematics(self.pair(), real(0.0), size, "strain"))
 
     def __call__(self, mesh, measurement, design, prior, **asked):
-        self.asked = {"mesh": mesh, **asked}
+        self.asked = {"mesh": mesh} | asked
         left = 0.3 * np.cos(4 * np.pi * measurement.phase)  # the second mesh order
         own = len(prior) + 1
         pitches = [f"{gear}_pitch_{tooth}" for gear, teeth in (("pinion", 19), ("wheel", 48)) for tooth in range(teeth)]

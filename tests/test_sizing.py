@@ -57,7 +57,7 @@ def test_relief_rules_follow_the_load(rule):
         assert float(slope) == pytest.approx(float(central), rel=1e-6)
     with pytest.raises(ValueError, match="torque = -1 N m"):
         rule(PAIR, -1.0)
-    with pytest.raises(ValueError, match=f"{rule.__name__}: application_factor"):
+    with pytest.raises(ValueError, match="application_factor"):
         rule(PAIR, 1.0, -0.5)
 
 
