@@ -17,7 +17,7 @@ from pathlib import Path  # noqa: E402
 import numpy as np  # noqa: E402
 
 import jaxgear as jg  # noqa: E402
-from jaxgear.io import load_design, optimize_request  # noqa: E402
+from jaxgear.io import Search, load_design  # noqa: E402
 
 FILE = Path(__file__).with_name("robust_50_50.toml")
 FACTORS = np.linspace(0.7, 1.3, 7)  # of the design torque
@@ -29,7 +29,7 @@ NAMES = ("unmodified", "nominal", "robust")
 def robust_optimum(file, mesh, tolerance, fast=False):
     """As the file asks; in fast mode of half as many gears, and without the search on a finer mesh."""
     if not fast:
-        return optimize_request(file)(mesh)
+        return Search.of(file)(mesh)
     asked = file.tables["optimize"]
     return jg.minimize(
         jg.Problem(

@@ -1,11 +1,14 @@
 """Texts of design files, and what the modifications remove that are read from them."""
 
+from types import SimpleNamespace
+
 import jax
 import jax.numpy as jnp
 import numpy as np
 
 from jaxgear.io import load_design
 from jaxgear.microgeometry import Flank
+from jaxgear.studies import SweepStudy
 
 PAIR = """
 [pinion]
@@ -50,3 +53,8 @@ def flank():
 def removed(modification):
     with jax.numpy_rank_promotion("allow"):  # the points of `flank` have axes of their own
         return np.broadcast_to(modification(flank()), (7, 33))
+
+
+def asked_sweep(design):
+    """Arguments of the sweep that a design file asks for, by name."""
+    return SimpleNamespace(**SweepStudy.of(design).settings.arguments(design))

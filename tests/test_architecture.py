@@ -105,7 +105,7 @@ HEAVY = {
     "jaxgear.plot",
 }
 # so do the commands, and their help without any of the library
-_NAMES = "devices", "new", "run", "sweep"
+_NAMES = "devices", "new", "run"
 COMMANDS = {*(f"jaxgear.cli.{name}" for name in _NAMES), "jaxgear.rexs.convert"}
 
 
@@ -169,7 +169,6 @@ def test_numerics_has_no_gear_word():
 
 # public functions and methods that do not say the type of every parameter and of their result, and why
 OF_ANY_TYPE = {
-    "cli/app.py run_place": "passes the options of a study on",
     "contact/status.py WithStatus.converged": "of the kind of array that the status is, of JAX or NumPy",
     "contact/solve.py contact_of": "takes forces or approaches, each of a type of its own",
     "dynamics/runs.py design_runs": "designs are a tree of arrays of any kind, options those of another function",
@@ -183,7 +182,6 @@ OF_ANY_TYPE = {
     "io/design_file.py DesignFile.spectrum": "takes any table with torques and weights",
     "io/gears.py with_quality": "takes any table with quality classes",
     "io/table_keys.py as_field": "a value of a file, for a field of any type",
-    "io/table_keys.py built": "makes an object of the class that the table names",
     "io/table_keys.py entry": "stands for the value of a key, whose annotation says the type",
     "io/tables.py FurtherTable.check": "takes a `DesignFile`, whose file imports this one",
     "io/tables.py FurtherTable.quantity": "likewise",
@@ -288,7 +286,7 @@ def test_import_is_silent_and_changes_nothing():
         "        getattr(jaxgear, name)\n"
         "assert not {'matplotlib', 'optax', 'typer', 'pyarrow', 'evosax'} & set(sys.modules)\n"
         "assert dict(jax.config.values) == before\n"
-        "import jaxgear.cli.run, jaxgear.cli.sweep\n"
+        "import jaxgear.cli.run\n"
         "jax.config.update('jax_num_cpu_devices', 3)\n"  # nothing has chosen the devices either
         "jax.config.update('jax_enable_x64', True)\n"
         "assert jax.device_count() == 3\n"

@@ -26,10 +26,10 @@ from report_page import Page, check_report
 
 import jaxgear as jg
 from jaxgear import plot
-from jaxgear.cli import app, cache, main, run
+from jaxgear.cli import cache, main, run
 from jaxgear.contact.status import Status
 from jaxgear.dynamics.mesh_tables import FILES
-from jaxgear.io import load_design, optimize_request
+from jaxgear.io import Search, first_look, load_design
 from jaxgear.io.folder import RESULT_FILES, result_folder
 from jaxgear.manufacture import over_balls
 from jaxgear.metrics import Finding
@@ -37,7 +37,7 @@ from jaxgear.microgeometry import NoModification
 from jaxgear.numerics import Usual
 from jaxgear.optimize import result as optimum_result
 from jaxgear.studies import evaluation, gear_data, manufactured, optimum_report, side_by_side
-from jaxgear.studies.comparison_run import ComparisonRun
+from jaxgear.studies.analysis import ComparisonRun
 from jaxgear.studies.gear_data import gears
 from jaxgear.studies.optimum_report import front_rows, front_table, gains
 from jaxgear.tolerance import ToleranceClass, iso_rounded
@@ -649,7 +649,7 @@ def test_a_quick_run_verifies_nothing(searched):
 
 
 def test_an_optimum_that_keeps_not_its_limits_is_no_success(folder, tmp_path, monkeypatch, searched):
-    request = importlib.import_module("jaxgear.io.optimize_table").OptimizeRequest
+    request = importlib.import_module("jaxgear.io.optimize_table").Search
     search, limit = request.__call__, optimum_result.Limit(432.1, None, 100.0, "MPa", False)
 
     def passing(self, *arguments):
@@ -856,7 +856,7 @@ def test_the_program_starts_as_a_process_of_its_own(tmp_path):
 
 
 def test_the_help_knows_every_method():
-    assert app.METHODS == ", ".join(jg.optimize.METHODS)
+    assert first_look.known_methods() == [*jg.optimize.METHODS, "pareto"]
 
 
 def test_help_and_version_need_no_file():
@@ -902,7 +902,7 @@ def test_a_new_design_file_runs_as_it_is(tmp_path):
     design = load_design(file)
     rule = jg.iso_relief(design.pair(), 50.0)
     assert design.values["wheel_amount"] == pytest.approx(float(rule.amount), abs=0.05)
-    assert optimize_request(design).method == "slp"
+    assert Search.of(design).method == "slp"
     file.write_text(f"{written}[resolution]\n{LINE}\n")
     result = call("analyze", file, "-o", tmp_path / "out", "--no-figures")
     assert result.code == 0 and "modified" in result.out

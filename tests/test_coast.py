@@ -5,7 +5,7 @@ import pytest
 import jaxgear as jg
 from jaxgear.io import DesignFileError, load_design
 from jaxgear.rexs.convert import convert
-from jaxgear.studies import DesignAnalysis
+from jaxgear.studies import AnalysisStudy
 from jaxgear.studies.study import AbstractStudy
 
 FILE = """
@@ -73,7 +73,7 @@ def test_what_knows_drive_flanks_alone_says_so(load, tmp_path):
     design = load(-150.0)
     with pytest.raises(DesignFileError) as refused:
         Other.of(design).run()
-    assert known.format("jaxgear other") in str(refused.value) and DesignAnalysis.takes_coast
+    assert known.format("jaxgear other") in str(refused.value) and AnalysisStudy.takes_coast
     options = {"stage": None, "flank": None, "load_case": None, "torque": None, "given": ()}
     with pytest.raises(DesignFileError, match="coast flanks, which jaxgear convert does not know"):
         convert(tmp_path / "pair.toml", tmp_path / "pair.rexs", **options)

@@ -13,20 +13,19 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from commands import LINE
-from design_texts import flank, loaded, text
+from design_texts import asked_sweep, flank, loaded, text
 
 import jaxgear as jg
 from jaxgear.compliance.laws import LinearLaw
 from jaxgear.geometry import path_of_contact
 from jaxgear.io import (
     DesignFileError,
+    Search,
     describe,
     flank_rows,
     load_design,
-    optimize_request,
     reference,
     result_folder,
-    sweep_request,
     write_design,
     write_summary,
 )
@@ -658,7 +657,7 @@ def test_a_file_that_cannot_be_read_is_named_by_its_key(load, tmp_path, key):
         table = REFERRING[key].replace("FILE", name)
         content = f"{table}{text()}" if table.startswith(("lubricant", "strength")) else text(tail=table)
         with pytest.raises(DesignFileError) as caught:
-            sweep_request(load(content))
+            asked_sweep(load(content))
         message = str(caught.value)
         assert f"/gear.toml: {key}: " in message and message.endswith(problem)
         assert f"{name}: " in message or "U+0000" in message
@@ -720,8 +719,8 @@ def test_whatever_is_written_in_a_file_it_is_read_or_refused_in_one_line(load, t
 
     def run(content):
         file = load(content)
-        optimize_request(file)
-        sweep_request(file)
+        Search.of(file)
+        asked_sweep(file)
 
     run(whole)  # the control: this one is right
     for place in rng.choice(len(places), times):
@@ -804,7 +803,7 @@ def test_variables_stand_for_numbers_of_gears_pair_and_load(load):
     file = load(whole)
     assert file.units == {"x": "x module", "a": "mm", "t": "N m"} and file.torque == 40.0
     assert float(file.pair().pinion.profile_shift) == pytest.approx(0.1)
-    request = sweep_request(file)
+    request = asked_sweep(file)
     assert request.highest_torque == 60.0 and request.plan.size == 8
     assert file.resolution(request.highest_torque).pairs == 4  # other variants can have a larger contact ratio
     low = {name: jnp.asarray(bounds[0]) for name, bounds in file.bounds.items()}
@@ -816,9 +815,9 @@ def test_variables_stand_for_numbers_of_gears_pair_and_load(load):
         ("high = 101.8", "high = 301.8", "pair.center_distance: 201.6 mm must be less than 106.8 mm"),
     ):
         with pytest.raises(DesignFileError, match=re.escape(problem)):
-            sweep_request(load(whole.replace(old, new)))
+            asked_sweep(load(whole.replace(old, new)))
     with pytest.raises(DesignFileError, match=r'pinion\.profile_shift: "x" is a variable, which a sweep alone'):
-        optimize_request(file)
+        Search.of(file)
 
 
 class SoftLaw(jg.compliance.AbstractContact):
@@ -850,13 +849,13 @@ results = ["max_flash_temperature"]
 def test_speed_and_friction_reach_objective_constraint_and_sweep(load):
     whole = text(pinion=RELIEF, load="speed = 1000.0\nfriction = 0.05", tail=VARIABLE + FLASH)
     file = load(whole)
-    for spectrum in (optimize_request(file)._problem["torque"], sweep_request(file).load):
+    for spectrum in (Search.of(file).problem["torque"], asked_sweep(file).load):
         assert float(spectrum.speeds[0]) == 1000.0 and float(spectrum.friction) == pytest.approx(0.05)
     # a variable: every variant has its own
     variable = 'n = { low = 500.0, high = 1500.0, unit = "rpm" }\n'
     free = load(whole.replace("speed = 1000.0", 'speed = "n"').replace("[optimize]", variable + "[optimize]"))
     assert free.speed == 1000.0 and free.units["n"] == "rpm"
-    request = sweep_request(free)
+    request = asked_sweep(free)
     operating_point = request.load({"height": jnp.asarray(1.0), "n": jnp.asarray(700.0)})
     assert (
         float(operating_point.speed) == 700.0
@@ -864,13 +863,13 @@ def test_speed_and_friction_reach_objective_constraint_and_sweep(load):
         and request.highest_torque == 50.0
     )
     with pytest.raises(DesignFileError, match=r'load\.speed: "n" is a variable, which a sweep alone'):
-        optimize_request(free)
+        Search.of(free)
 
 
 @pytest.mark.slow
 def test_a_sweep_of_gears_pair_and_load_solves_each_as_the_library_does(load):
     file = load(open_case())
-    request = sweep_request(file)
+    request = asked_sweep(file)
     mesh = file.sweep_mesh(file.resolution(request.highest_torque))
     table = jg.sweep(mesh, request.load, file.design, request.plan, results=request.results, units=file.units)
     rows = {key: table.column(key) for key in ("x", "a", "t", "mean_te_um", "converged")}

@@ -11,12 +11,13 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from commands import LINE, call
+from design_texts import asked_sweep
 from report_page import check_report
 
 from jaxgear.dynamics import Oscillator, RectangularStiffness, SpeedResponse
-from jaxgear.io import DesignFileError, dynamics_request, load_design, sweep_request
+from jaxgear.io import DesignFileError, load_design
 from jaxgear.io.folder import RESULT_FILES
-from jaxgear.studies import Checkpoints, DynamicsResult
+from jaxgear.studies import Checkpoints, DynamicsResult, DynamicsStudy
 from jaxgear.studies.checkpoints import SpeedResponses
 
 pytestmark = pytest.mark.usefixtures("no_cache")
@@ -62,7 +63,7 @@ FIGURES = (
 
 @pytest.mark.parametrize("quick", [["--quick"], pytest.param([], marks=pytest.mark.slow)], ids=["quick", "whole"])
 def test_the_command_writes_what_it_says(file, tmp_path, monkeypatch, quick):
-    monkeypatch.setattr(importlib.import_module("jaxgear.io.dynamics_table"), "_QUICK_NUMBER", 9)
+    monkeypatch.setattr(importlib.import_module("jaxgear.studies.dynamics"), "_QUICK_SPEEDS", 9)
     path, folder = file(PAIR + TABLE + "run_up = 0.1\n[tolerance]\nquality_class = 7\n"), tmp_path / "out"
     done = call("dynamics", str(path), "--output", str(folder), "--report", *quick)
     code, out, err = done.code, done.out, done.err
@@ -182,9 +183,9 @@ def test_masses_that_cannot_resonate_and_bores_left_open_are_said(file):
     for old, new in wanted.items():
         text = text.replace(old, new)
     design = load_design(file(text))
-    request = dynamics_request(design)
+    settings = DynamicsStudy.of(design).settings
     study = SimpleNamespace(
-        design=design, request=request, torque=200.0, natural_frequencies={"unmodified": {200.0: 20.0}}
+        design=design, settings=settings, torque=200.0, natural_frequencies={"unmodified": {200.0: 20.0}}
     )
     (far,), (bore,) = DynamicsResult._far_from_resonance(study), DynamicsResult._bodies(study)
     assert "all speeds lie at 75 to 175 times the natural frequency of 20 Hz" in far and "pinion_inertia" in far
@@ -194,10 +195,10 @@ def test_masses_that_cannot_resonate_and_bores_left_open_are_said(file):
 
 def test_speeds_of_the_pinion_are_mesh_frequencies(file):
     text = PAIR + TABLE.replace("mesh_frequencies = [1500.0, 3500.0]", "speeds = [1800.0, 4200.0]")
-    request = dynamics_request(load_design(file(text)))
-    frequencies = np.asarray(request.settings.mesh_frequencies)
+    study = DynamicsStudy.of(load_design(file(text)))
+    frequencies = np.asarray(study.settings.mesh_frequencies)
     assert frequencies == pytest.approx(np.linspace(1500.0, 3500.0, 9))  # 50 teeth, 60 s
-    assert request.torques == (200.0,)
+    assert study.torques == (200.0,)
 
 
 SWEEP = """
@@ -216,13 +217,13 @@ length = 3.0
 def test_a_design_file_binds_names_to_its_settings(file):
     """The settings of the table, and a refusal in one line without them."""
     text = PAIR + SWEEP.format(name="worst_dynamic_factor")
-    results = sweep_request(load_design(file(text + TABLE))).results
-    request = dynamics_request(load_design(file(text + TABLE)))
-    assert results == ("ppte", request.settings.quantity("worst_dynamic_factor"))
+    results = asked_sweep(load_design(file(text + TABLE))).results
+    study = DynamicsStudy.of(load_design(file(text + TABLE)))
+    assert results == ("ppte", study.settings.quantity("worst_dynamic_factor"))
     with pytest.raises(DesignFileError, match=r'sweep.results\[1\]: "worst_dynamic_factor" needs the table \[dynam'):
-        sweep_request(load_design(file(text)))
+        asked_sweep(load_design(file(text)))
     with pytest.raises(DesignFileError, match='"dte_rms" needs load.speed'):
-        sweep_request(load_design(file(PAIR + SWEEP.format(name="dte_rms") + TABLE)))
+        asked_sweep(load_design(file(PAIR + SWEEP.format(name="dte_rms") + TABLE)))
 
 
 def test_kept_responses_are_not_made_again(tmp_path):
@@ -276,7 +277,7 @@ def test_a_largest_dynamic_factor_at_the_highest_speed_is_told():
     runs = {"rises": response(1.0, 1.2, 1.3), "peaks": response(1.0, 1.4, 1.2), "beyond": response(1.0, 1.2, 1.3)}
     study = SimpleNamespace(
         natural_frequencies={"rises": {50.0: 400.0}, "peaks": {50.0: 400.0}, "beyond": {50.0: 250.0}},
-        request=SimpleNamespace(settings=SimpleNamespace(mesh_frequencies=frequencies)),
+        settings=SimpleNamespace(mesh_frequencies=frequencies),
         rows=lambda: ((name, 50.0, "up", of) for name, of in runs.items()),
     )
     (told,) = DynamicsResult._still_rising(study)

@@ -95,15 +95,15 @@ def test_helical_gears():
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        ({"torque": 0.0}, "mesh_tables: torque = 0 N m must be greater than 0 N m"),
-        ({"torques": [-1.0]}, "mesh_tables: torques = -1 N m must be at least 0 N m"),
-        ({"torques": [float("nan")]}, "mesh_tables: torques = nan N m must be"),
-        ({"orders": 8}, "mesh_tables: orders = 8 must be at most 7"),
+        ({"torque": 0.0}, "torque = 0 N m must be greater than 0 N m"),
+        ({"torques": [-1.0]}, "torques = -1 N m must be at least 0 N m"),
+        ({"torques": [float("nan")]}, "torques = nan N m must be"),
+        ({"orders": 8}, "orders = 8 must be at most 7"),
         ({"levels": 1}, "levels = 1 must be a whole number of at least 4"),
     ],
 )
 def test_what_is_refused(spur, given, message):
-    with pytest.raises(ValueError, match="mesh_") as refused:
+    with pytest.raises(ValueError) as refused:
         dynamics.mesh_tables(spur[0], **{"torque": 50.0, **given})
     assert message in str(refused.value) and "\n" not in str(refused.value)
 

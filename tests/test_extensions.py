@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 from catalogue import LINE, gear_pair
 from commands import FREE, call
-from design_texts import loaded, removed, text
+from design_texts import asked_sweep, loaded, removed, text
 from jaxtyping import Array
 
 import jaxgear as jg
 from jaxgear.compliance import AbstractCompliance, ContactGeometry, Plane
-from jaxgear.io import DesignFileError, describe, optimize_request, quantities_of_tables, sweep_request
+from jaxgear.io import DesignFileError, Search, describe, quantities_of_tables
 from jaxgear.metrics import AbstractSettings, Quantity
 from jaxgear.microgeometry import AbstractCurve, AbstractModification
 from jaxgear.numerics import AbstractSpring, Checked, number
@@ -205,9 +205,8 @@ def test_design_files_know_a_quantity_of_own_settings(traced, load):
     asked += '[sweep]\nsamples = 8\nresults = ["level"]\n'
     asked += '[optimize]\nobjective = "level"\nconstraint = [{ of = "level", high = 9.0 }]\n'
     design = load(text(**FREE_TIP, tail=f"[microphone]\ndistance = 0.5\n{asked}"))
-    (result,) = sweep_request(design).results
-    request = optimize_request(design)
-    asked_for = request._problem
+    (result,) = asked_sweep(design).results
+    asked_for = Search.of(design).problem
     (limit,) = asked_for["constraints"]
     known = {quantity.name: quantity for quantity in quantities_of_tables(design)}
     for quantity in (result, asked_for["objective"], limit.quantity, known["level"]):
@@ -281,11 +280,11 @@ def test_a_method_of_a_user_is_given_as_an_object_or_known_by_name(load, monkeyp
     monkeypatch.setitem(jg.optimize.METHODS, "scatter", Scatter)
     asked = BY_FACTORIAL.replace("factorial", "scatter") + "seed = 3\nscatter = { designs = 5 }\n"
     asked += "rounding = { length = 0, amount = 0 }\n"
-    named = optimize_request(load(asked), quick=True)(mesh)
+    named = Search.of(load(asked), quick=True)(mesh)
     assert named.parameters == given.parameters and named.objective == given.objective
     for wrong, problem in (
         ("designs = 0", "optimize.scatter.designs: 0 must be at least 1 and at most 1000"),
         ("design = 5", 'optimize.scatter.design: unknown key, did you mean "designs"?'),
     ):
         with pytest.raises(DesignFileError, match=re.escape(problem)):
-            optimize_request(load(asked.replace("designs = 5", wrong)))
+            Search.of(load(asked.replace("designs = 5", wrong)))

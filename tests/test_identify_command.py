@@ -11,7 +11,7 @@ from commands import FIXED, VARIABLES, assert_refused, call
 
 from jaxgear.conditions import solve_case
 from jaxgear.contact.kinematics import kinematics
-from jaxgear.identification import DesignIdentification, Identified
+from jaxgear.identification import IdentificationStudy, Identified
 from jaxgear.identification import study as identification
 from jaxgear.io import DesignFile, load_design
 from jaxgear.numerics import real
@@ -171,11 +171,11 @@ def test_what_it_asks_for(ran):
 def test_priors_are_those_of_the_class_of_each_gear(tmp_path):
     path, data = written(tmp_path, BOTH + CLASSES)
     design = load_design(path)
-    prior = DesignIdentification.of(design, measured=data, noise=0.05).prior
+    prior = IdentificationStudy.of(design, measured=data, noise=0.05).prior
     for (mean, deviation), gear, number, value in zip(prior.values(), design.pair().gears, (5, 7), (10.0, 6.0)):
         assert mean == value and deviation == pytest.approx(float(ToleranceClass.of(gear, number).profile_total) / 3)
     (tmp_path / "pair.toml").write_text(BASE, encoding="utf-8")
-    assert DesignIdentification.of(load_design(path), measured=data, noise=0.05).prior == {"height": (10.0, 5.0)}
+    assert IdentificationStudy.of(load_design(path), measured=data, noise=0.05).prior == {"height": (10.0, 5.0)}
 
 
 def test_an_estimate_that_is_no_flank_is_flagged_and_makes_no_design_file(tmp_path, monkeypatch):

@@ -15,7 +15,7 @@ from jaxgear.cli import interrupt, launcher, terminal
 from jaxgear.io import folder
 from jaxgear.io.folder import result_folder
 from jaxgear.studies import AbstractStudyResult
-from jaxgear.studies.comparison_run import ComparisonRun
+from jaxgear.studies.analysis import ComparisonRun
 
 pytestmark = pytest.mark.usefixtures("no_cache")
 

@@ -12,11 +12,11 @@ from report_page import check_report
 
 import jaxgear as jg
 from jaxgear import plot
-from jaxgear.io import layout_request, load_design
+from jaxgear.io import load_design
 from jaxgear.io.folder import RESULT_FILES
 from jaxgear.layout import at_stations, layout_flank_lines
 from jaxgear.metrics import face_load_factor
-from jaxgear.studies import LayoutResult
+from jaxgear.studies import LayoutResult, LayoutStudy
 from jaxgear.vocabulary import quantities
 
 pytestmark = pytest.mark.usefixtures("no_cache")
@@ -112,7 +112,7 @@ DOUBTFUL = FILE.replace("bore_diameter = 70.0", "bore_diameter = 44.0")  # less 
 def two_torques(monkeypatch):
     """Flank lines for a duty cycle, whose torques are all there are: one program for both."""
     for name in "_TORQUES", "_QUICK_TORQUES":
-        monkeypatch.setattr(importlib.import_module("jaxgear.io.layout_table"), name, 2)
+        monkeypatch.setattr(importlib.import_module("jaxgear.studies.layout"), name, 2)
     return (DOUBTFUL + IDLE).replace("torque = 150.0\n", "torque = 150.0\ntorque_range = [60.0, 300.0]\n", 1)
 
 
@@ -231,9 +231,9 @@ def test_twice_the_slices_are_those_of_the_file(file, tmp_path):
     found = json.loads((tmp_path / "out" / "summary.json").read_text())
     assert " slices (contact analysis); twice as many change face load factor K_Hbeta: unm" in done.out, done.err
     finer = load_design(written(8))
-    request, size = layout_request(finer), finer.resolution()
-    held = at_stations(request.supports["rigid seats"], request.profile_torque, stations=size.slices)
-    after = face_load_factor(jg.solve(finer.mesh(size, held, rigid=False), request.profile_torque))
+    study, size = LayoutStudy.of(finer), finer.resolution()
+    held = at_stations(study.supports["rigid seats"], study.profile_torque, stations=size.slices)
+    after = face_load_factor(jg.solve(finer.mesh(size, held, rigid=False), study.profile_torque))
     before = found["contact"]["rigid seats"]["unmodified"]["face_load_factor"]
     change = found["change_at_twice_the_slices"]["unmodified"]["face_load_factor"]
     assert change == pytest.approx(float(after) - before, rel=1e-6) and change > 0.01
@@ -243,7 +243,7 @@ def test_twice_the_slices_are_those_of_the_file(file, tmp_path):
 def test_the_radar_has_the_lives_of_both_gears(file, monkeypatch):
     """Where there is a duty cycle; that without any K_Hbeta has no life."""
     design = load_design(file(FILE + LIFE))
-    request, drawn = layout_request(design, quick=True), []
+    asked, drawn = LayoutStudy.of(design, quick=True), []
     others = "face_load_factors", "face_load_over_torque", "shaft_deflection"
     for name in others:
         monkeypatch.setattr(plot, name, lambda *given, **options: None)
@@ -256,9 +256,7 @@ def test_the_radar_has_the_lives_of_both_gears(file, monkeypatch):
         radar_variants=lambda: ([0, 1], ["no profile modification", "best"]),
     )
     layout = SimpleNamespace(after={"maximum": None}, cases=[])
-    study = SimpleNamespace(
-        design=design, request=request, main=layout, over_torque={}, cycles={}, profile=profile, profiles={}
-    )
+    study = SimpleNamespace(**{**vars(asked), "profile": profile}, main=layout, over_torque={}, cycles={}, profiles={})
     study.lives = lambda profile: LayoutResult.lives(study, profile)
     assert list(LayoutResult.figures(study))[-1] == "radar"
     (values,) = drawn
@@ -267,7 +265,7 @@ def test_the_radar_has_the_lives_of_both_gears(file, monkeypatch):
     for of in lives:
         uneven, even, none = values[of]
         assert uneven / even == pytest.approx(1.2**-6.6, rel=1e-9) and np.isnan(none)
-    study.request = SimpleNamespace(**{**vars(request), "options": {}})
+    study.options = {}
     LayoutResult.figures(study)
     assert list(drawn[1]) == list(values)[:-2]
 
@@ -311,14 +309,14 @@ def test_profiles_follow_the_flank_lines(file, tmp_path):
 def test_the_file_is_the_script(file):
     """What the command finds is what the library finds for the same gearbox; a mesh angle turns the plane of action."""
     design = load_design(file(FILE))
-    request = layout_request(design)
-    assert layout_request(design, quick=True).options["stations"] == 21
-    assert list(request.supports) == ["housing", "rigid seats"]
-    assert request.supports["housing"].gearbox.housing.nodes == ("A.x", "B.x", "C.x", "D.x")
-    assert request.supports["rigid seats"].gearbox.housing is None
+    study = LayoutStudy.of(design)
+    assert LayoutStudy.of(design, quick=True).options["stations"] == 21
+    assert list(study.supports) == ["housing", "rigid seats"]
+    assert study.supports["housing"].gearbox.housing.nodes == ("A.x", "B.x", "C.x", "D.x")
+    assert study.supports["rigid seats"].gearbox.housing is None
     turned = FILE.replace("[layout]", '[[meshes]]\npinion = "pinion"\nwheel = "wheel"\nangle = 70.0\n[layout]')
-    other = layout_request(load_design(file(turned)))
-    bent = [np.asarray(at_stations(one.supports["housing"], 150.0, stations=6).bent) for one in (request, other)]
+    other = LayoutStudy.of(load_design(file(turned)))
+    bent = [np.asarray(at_stations(one.supports["housing"], 150.0, stations=6).bent) for one in (study, other)]
     # of the soft corner in x alone, whatever lies in the line of action: cos of its angle with the plane
     tilts = [each[-1] - each[0] for each in bent]
     assert abs(tilts[0] - tilts[1]) > 0.1
@@ -327,9 +325,9 @@ def test_the_file_is_the_script(file):
 @pytest.mark.slow
 def test_the_flank_line_follows_the_plane_of_action(file):
     turned = FILE.replace("[layout]", '[[meshes]]\npinion = "pinion"\nwheel = "wheel"\nangle = 70.0\n[layout]')
-    requests = [layout_request(load_design(file(text))) for text in (FILE, turned)]
+    studies = [LayoutStudy.of(load_design(file(text))) for text in (FILE, turned)]
     slopes = [
-        float(layout_flank_lines(one.supports["housing"], one.tolerances, **one.options).line.slope) for one in requests
+        float(layout_flank_lines(one.supports["housing"], one.tolerances, **one.options).line.slope) for one in studies
     ]
     assert abs(slopes[0] - slopes[1]) > 0.1
 
@@ -356,8 +354,8 @@ misalignment = { direct = 5.0 }
     text = FILE.replace("body_diameter = 70.0 }", f"body_diameter = 70.0 }}, {third}")
     text = text.replace("couplings = [{ position = 190.0 }]\n", "", 1).replace("[layout]", fourth, 1)
     text = text.replace('[housing]\nfile = "housing.csv"\n', "")
-    request = layout_request(load_design(file(text)))
-    (found,) = request.supports.values()
+    study = LayoutStudy.of(load_design(file(text)))
+    (found,) = study.supports.values()
     np.testing.assert_allclose(found.gearbox.pinion_torques(), [150.0, 150.0 * 48 / 19])
     assert float(found.gearbox.meshes[1].misalignment.direct) == 5.0
 
@@ -365,16 +363,16 @@ misalignment = { direct = 5.0 }
 def test_the_bearing_span_of_a_drawing_matters(file):
     """Of half the span twice the deviation is left over the face; by class no span is asked for."""
     texts = {span: replaced("span = 80.0", f"span = {span}") for span in ("40.0", "80.0")}
-    spans = {span: layout_request(load_design(file(text))).tolerances for span, text in texts.items()}
+    spans = {span: LayoutStudy.of(load_design(file(text))).tolerances for span, text in texts.items()}
     for kind in ("maximum", "statistical"):
         near, far = (spans[span][kind].misalignment for span in ("40.0", "80.0"))
         assert float(far) > 1.0 and float(near) == pytest.approx(2 * float(far))
     given = {}
     for text in ('"class"', "{ direct = 5.0 }"):
-        request = layout_request(load_design(file(replaced(AXES, text))))
-        given[text] = float(request.tolerances["maximum"].misalignment)
+        study = LayoutStudy.of(load_design(file(replaced(AXES, text))))
+        given[text] = float(study.tolerances["maximum"].misalignment)
     assert given["{ direct = 5.0 }"] == pytest.approx(5.0) and given['"class"'] > 5.0
-    parallel = layout_request(load_design(file(replaced(f"misalignment = {AXES}\n", ""))))
+    parallel = LayoutStudy.of(load_design(file(replaced(f"misalignment = {AXES}\n", ""))))
     assert float(parallel.tolerances["maximum"].misalignment) == 0.0
 
 
@@ -384,7 +382,7 @@ def test_an_analysis_stands_on_the_shafts_of_the_file(file, monkeypatch):
     design = load_design(file(FILE))
     mesh = design.mesh()
     assert design.left_out == "" and mesh.support_torque is None
-    own = layout_request(design).supports["housing"]
+    own = LayoutStudy.of(design).supports["housing"]
     for torque in (75.0, 150.0):
         held, y = at_stations(own, torque, stations=6), mesh.face_coordinate
         np.testing.assert_allclose(mesh.support.influence(y), held.influence(y), rtol=1e-9)
@@ -573,7 +571,7 @@ def test_torques_without_a_load_over_the_face_are_told():
     """Of shafts afloat in their clearances at some torques only."""
     nothing: dict = {"layouts": {}, "contacts": {}, "profiles": {}}
     over = {"unmodified": np.array([1.2, np.nan, 1.1]), "step 1": np.array([1.0, np.nan, 1.0])}
-    study = SimpleNamespace(**nothing, over_torque=over, request=SimpleNamespace(torques=np.array([50.0, 75.0, 100.0])))
+    study = SimpleNamespace(**nothing, over_torque=over, torques=np.array([50.0, 75.0, 100.0]))
     assert list(LayoutResult.failures(study)) == ["LOAD OVER THE FACE NOT CONVERGED at 75 N m"]
 
 

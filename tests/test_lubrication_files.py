@@ -7,14 +7,15 @@ import equinox as eqx
 import numpy as np
 import pytest
 from commands import LINE
+from design_texts import asked_sweep
 
 import jaxgear as jg
-from jaxgear.cli import run, sweep
+from jaxgear.cli import run
 from jaxgear.contact import OperatingPoint
-from jaxgear.io import DesignFileError, load_design, optimize_request, quantities_of_tables, sweep_request
+from jaxgear.io import DesignFileError, Search, load_design, quantities_of_tables
 from jaxgear.metrics import share_settings
 from jaxgear.numerics import program
-from jaxgear.studies import DesignAnalysis, evaluation
+from jaxgear.studies import AnalysisStudy, SweepStudy, evaluation
 
 pytestmark = pytest.mark.usefixtures("no_cache")
 
@@ -149,15 +150,15 @@ def test_what_is_wrong_in_the_file_of_the_oil_names_that_file(load, tmp_path):
 
 def test_a_constraint_and_a_column_need_their_table(load):
     design = load(PAIR + OIL + STRENGTH + RELIEF)
-    (constraint,) = optimize_request(design)._problem["constraints"]
+    (constraint,) = Search.of(design).problem["constraints"]
     assert constraint.quantity == design.tables["lubricant"].quantity("scuffing_safety")
-    assert sweep_request(design).results[2] == design.tables["strength"].quantity("pinion_root_safety")
+    assert asked_sweep(design).results[2] == design.tables["strength"].quantity("pinion_root_safety")
     for text, message in (
         (PAIR + STRENGTH + RELIEF, 'optimize.constraint[0].of: "scuffing_safety" needs the table [lubricant]'),
         (PAIR + OIL + RELIEF.replace("scuffing", "micropitting"), "needs lubricant.permissible_film"),
     ):
         with pytest.raises(DesignFileError, match=re.escape(message)):
-            optimize_request(load(text))
+            Search.of(load(text))
     for text, message in (
         (PAIR + UNLIMITED, 'sweep.results[0]: "loss_power" needs load.friction or the table [lubricant]'),
         (PAIR.replace("speed = 3000.0", "") + UNLIMITED, 'sweep.results[0]: "loss_power" needs load.speed'),
@@ -165,7 +166,7 @@ def test_a_constraint_and_a_column_need_their_table(load):
         (PAIR + OIL + "[strength]\npressure = 1e3" + UNLIMITED, "needs strength.bending"),
     ):
         with pytest.raises(DesignFileError, match=re.escape(message)):
-            sweep_request(load(text))
+            asked_sweep(load(text))
 
 
 @pytest.mark.slow
@@ -190,7 +191,7 @@ def test_analysis_and_sweep_give_what_the_library_gives(load, file, tmp_path, ca
         sweep_table(file(PAIR + "friction = 0.05" + OIL + STRENGTH + RELIEF), tmp_path)
     fixed = RELIEF.partition("[variables]")[0].replace('"amount"', "6.0")
     path = file(PAIR + OIL + STRENGTH + fixed)
-    assert run.run_study(DesignAnalysis.of, path, tmp_path / "out", figures=False, cache=False)
+    assert run.run_study(AnalysisStudy, {}, path, tmp_path / "out", figures=False, cache=False)
     summary = json.loads((tmp_path / "out" / "summary.json").read_text())
     modified, expected = summary["designs"]["modified"], solved(6.0)
     assert [modified[quantity.key] for quantity in numbers] == pytest.approx([float(number) for number in expected])
@@ -236,7 +237,7 @@ def test_a_sweep_over_the_speed(load, file, tmp_path):
 
 def sweep_table(path, folder):
     """Rows of the sweep of a design file."""
-    assert sweep.run_sweep(path, folder / "sweep", samples=None, best=2, quick=False, figures=False, cache=False)
+    assert run.run_study(SweepStudy, {"best": 2}, path, folder / "sweep", figures=False, cache=False)
     import pyarrow.dataset as dataset
 
     return dataset.dataset(folder / "sweep" / "table").to_table().to_pylist()

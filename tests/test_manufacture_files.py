@@ -434,7 +434,7 @@ def test_a_design_file_holds_a_search_to_what_the_wheel_grinds(tmp_path):
     def request(name):
         limits = f'[[optimize.constraint]]\nof = "{name}"\nhigh = 1.0\n'
         text = DESIGN.replace("[wheel]", relief).format(file="measured.csv", more="") + variables + limits
-        return io.optimize_request(io.load_design(written(tmp_path, text, "design.toml")))
+        return io.Search.of(io.load_design(written(tmp_path, text, "design.toml")))
 
     assert request("pinion_quadratic_deviation").method == request("wheel_cubic_deviation_um").method == "slp"
     with pytest.raises(io.DesignFileError, match='"pinion_quadratic" is not known, did you mean "pinion_quadratic_dev'):

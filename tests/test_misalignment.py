@@ -10,7 +10,7 @@ from catalogue import gear_pair, prepare
 from commands import FACE, FIXED, LINE, assert_refused, call
 
 import jaxgear as jg
-from jaxgear.io import DesignFileError, load_design, optimize_request
+from jaxgear.io import DesignFileError, Search, load_design
 from jaxgear.shafts import Misalignment, RigidSupport
 
 AMOUNT = 12.0
@@ -108,7 +108,7 @@ VARIABLES = "[variables]\nf = { low = 0.0, high = 20.0 }\n"
 
 def test_an_optimization_does_not_vary_it(load):
     with pytest.raises(DesignFileError, match=r'misalignment\.direct: "f" is a variable, which a sweep alone'):
-        optimize_request(load('direct = "f"', VARIABLES + "[optimize]\n"))
+        Search.of(load('direct = "f"', VARIABLES + "[optimize]\n"))
 
 
 @pytest.mark.slow

@@ -129,7 +129,7 @@ def test_it_is_a_command_with_results_and_report(file, tmp_path, package):
     places = [next(number for number, line in enumerate(lines) if word in line) for word in order]
     assert places == sorted(places) and "[tolerance] is not part" in done.err
     assert "jaxgear: sharing 20 N m\n" in done.err and not list(tmp_path.glob(".out*"))
-    page = check_share_report(folder, path)
+    page = check_report(folder, path, "share", path, "-o", folder, "--report")
     assert ["50", "2.632"] in page.rows
     assert "Every tooth carries the same." in (folder / "report.html").read_text("utf-8")
 
@@ -148,15 +148,6 @@ def test_who_reads_no_verdict_has_the_files(file, tmp_path, package):
     with open(writer, "w") as stream, contextlib.redirect_stdout(stream), pytest.raises(SystemExit) as ended:
         main(["share", str(file(FIXED)), "-o", str(tmp_path / "out"), "--no-figures"])
     assert ended.value.code == 0 and (tmp_path / "out" / "shares.csv").exists()
-
-
-def check_share_report(folder, path):
-    """As of every report, but for designs, of which there are none."""
-    summary = folder / "summary.json"
-    held = summary.rename(folder / "held.json")
-    page = check_report(folder, path, "share", path, "-o", folder, "--report")
-    held.rename(summary)
-    return page
 
 
 class Pressed(list):
@@ -235,10 +226,10 @@ def test_what_cannot_be_a_study_is_one_line(file, tmp_path, package, monkeypatch
 
 
 def test_every_study_of_the_package_is_a_command_of_its_name():
-    for name, place in registry.own().items():
+    for name, place in registry.OWN.items():
         study = registry.load(place)
         assert study.name == name and registry.help_of(place)
-    assert set(registry.own()) >= {"dynamics", "layout", "wear"}
+    assert set(registry.OWN) >= {"dynamics", "layout", "wear"}
 
 
 def test_other_packages_are_looked_for_only_where_a_name_is_unknown():
@@ -260,7 +251,7 @@ def test_other_packages_are_looked_for_only_where_a_name_is_unknown():
 def test_a_library_prints_nothing_and_writes_where_it_is_asked(file, tmp_path, capsys, monkeypatch):
     """The studies of the commands are studies like any other."""
     monkeypatch.setattr("jaxgear.studies.evaluation._TORQUES", 5)
-    study, stages = studies.DesignAnalysis.of(load_design(file(FIXED))), []
+    study, stages = studies.AnalysisStudy.of(load_design(file(FIXED))), []
     result = study.run(callback=lambda progress: stages.append(progress.stage))
     assert stages == ["preparing the mesh", "solving the unmodified design", "solving the modified design"]
     data, figures = studies.write_results(tmp_path / "new" / "results", study, result, figures=False)

@@ -7,8 +7,9 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from commands import FIXED, FREE, VARIABLES, assert_refused, call
+from design_texts import asked_sweep
 
-from jaxgear.io import DesignFileError, load_design, optimize_request, sweep_request, teeth_of
+from jaxgear.io import DesignFileError, Search, load_design, teeth_of
 from jaxgear.io.folder import RESULT_FILES
 from jaxgear.studies import RevolutionStudy
 
@@ -122,10 +123,10 @@ def test_what_is_refused(written, teeth, message):
 
 def test_names_of_quantities_take_the_table(written):
     search = FREE.replace("[optimize]", '[optimize]\nobjective = "pinion_side_bands"')
-    assert optimize_request(load_design(written(base=search)))._problem["objective"].settings.counts == (19, 48)
+    assert Search.of(load_design(written(base=search))).problem["objective"].settings.counts == (19, 48)
     base = FIXED.replace("amount = 6.5", 'amount = "height"') + VARIABLES
     sweep = base + '[sweep]\nsamples = 8\nresults = ["total_composite_error"]\n'
-    assert sweep_request(load_design(written(base=sweep))).results[0].settings.over == "pinion"
+    assert asked_sweep(load_design(written(base=sweep))).results[0].settings.over == "pinion"
     with pytest.raises(DesignFileError, match=r'"pinion_side_bands" needs the table \[teeth\]'):
         load_design(written("", base=search))
     with pytest.raises(DesignFileError, match='"wheel_side_bands" needs whole revolutions of the wheel and'):

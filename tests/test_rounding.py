@@ -8,7 +8,7 @@ import pytest
 from known_optimum import Known
 
 import jaxgear as jg
-from jaxgear.io import DesignFileError, load_design, optimize_request
+from jaxgear.io import DesignFileError, Search, load_design
 from jaxgear.optimize import Constraint, search
 from jaxgear.optimize.problem import Score
 from jaxgear.optimize.refine import refined
@@ -150,7 +150,7 @@ curve = { type = "power", exponent = "exponent" }
 def test_a_design_file_rounds_amounts_and_lengths_unless_it_says_otherwise(tmp_path):
     def steps(text):
         (tmp_path / "pair.toml").write_text(FILE + text, encoding="utf-8")
-        return optimize_request(load_design(tmp_path / "pair.toml"))._search.get("rounding")
+        return Search.of(load_design(tmp_path / "pair.toml")).options.get("rounding")
 
     assert steps("") == {"amount": 0.5}  # no multiple of 0.1 mm lies within the bounds of the length
     assert steps("[optimize.rounding]\namount = 0\nlength = 0.01\n") == {"length": 0.01}

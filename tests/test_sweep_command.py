@@ -1,6 +1,7 @@
 """The command `jaxgear sweep`: what it prints and writes, how it resumes, and that every failure is one line."""
 
 import csv
+import importlib
 import os
 import signal
 import subprocess
@@ -17,19 +18,20 @@ import pyarrow
 import pyarrow.parquet as parquet
 import pytest
 from commands import FREE, SWEEP, assert_refused, call
+from design_texts import asked_sweep
 from report_page import assert_row, check_report
 
 import jaxgear as jg
-from jaxgear.cli import devices, progress, sweep_report
-from jaxgear.cli import sweep as sweep_command
-from jaxgear.cli.sweep_report import said_of_best
+from jaxgear.cli import devices
 from jaxgear.contact.status import Status
-from jaxgear.io import load_design, read_variants, sweep_request
+from jaxgear.io import load_design, read_variants
 from jaxgear.metrics.findings import LIMITS
-from jaxgear.studies import evaluation
+from jaxgear.studies import evaluation, sweep_result
+from jaxgear.studies.progress import Stages
 from jaxgear.sweeps import SweepTable, evaluate
 from jaxgear.sweeps.columns import Column, described
 
+SWEEPS = importlib.import_module("jaxgear.studies.sweep")
 CHOSEN = 2  # variants that the report shows side by side and on a page each
 
 
@@ -51,7 +53,7 @@ def folder(tmp_path_factory):
     os.environ["JAXGEAR_NO_CACHE"] = "1"
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(evaluation, "_TORQUES", 5)  # as in `test_cli`
-        patch.setattr(sweep_report, "CHOSEN", CHOSEN)
+        patch.setattr(sweep_result, "CHOSEN", CHOSEN)
         result = call("sweep", folder / "gear.toml", "-o", folder / "out", "--best", "5", "--report")
     assert result.code == 0, result.err
     return folder, result
@@ -70,7 +72,7 @@ def test_the_best_variant_says_what_a_finer_mesh_would_change_and_what_is_unusua
     assert f"evaluated at 16 positions; twice as many change PPTE: {told}" in result.out
     assert told in (folder / "out" / "report.html").read_text("utf-8")
     monkeypatch.setitem(LIMITS, "flank pressure", LIMITS["flank pressure"]._replace(high=1.0))
-    _, (unusual,) = said_of_best(file, best, size)
+    _, (unusual,) = SWEEPS.said_of_best(file, best, size)
     assert unusual.startswith(f"warning: variant {best.column('variant')[0]} at 50 N m: flank pressure ")
 
 
@@ -106,7 +108,7 @@ def test_the_table_is_that_of_the_library(folder):
         table.column("height"), jg.LatinHypercube({"height": (0.0, 20.0)}, 60, seed=0).rows(0, 60)[:, 0]
     )
     file = load_design(folder / "gear.toml")
-    plan = sweep_request(file).plan
+    plan = asked_sweep(file).plan
     direct = jg.sweep(file.mesh(), 50.0, file.design, plan, results=("ppte", "effective_contact_ratio"))
     np.testing.assert_array_equal(table.column("ppte_um"), direct.column("ppte_um"))
 
@@ -132,11 +134,11 @@ def test_pictures_show_every_variant_or_an_even_share(folder, tmp_path, monkeypa
         "transmission_error_orders",
         "k_chart",
     } < names  # of the best, for the report
-    monkeypatch.setattr(sweep_report, "_DRAWN", 20)
+    monkeypatch.setattr(sweep_result, "_DRAWN", 20)
     drawn = {}
     monkeypatch.setattr("jaxgear.plot.pareto", lambda table: drawn.update(table) or plt.subplots()[1])
     table = jg.open_sweep(folder / "out" / "table")
-    sweep_report.write_figures(tmp_path, table)
+    sweep_result.figures_of(table)
     front = table.pareto(["ppte_um", "effective_contact_ratio"]).column("ppte_um")
     assert set(drawn[table.find("ppte")]) == {*table.column("ppte_um")[::3], *front}
 
@@ -147,7 +149,7 @@ def test_repeated_it_finds_everything_there(folder):
     result = sweep(folder / "gear.toml", "-o", folder / "out")
     assert result.code == 0 and "resuming, 60 of 60 variants are complete" in result.err
     assert {path.name: path.stat().st_mtime_ns for path in (folder / "out" / "table").glob("part-*")} == before
-    other = sweep(folder / "out", "--samples", folder / "gear.toml", "-o")
+    other = sweep(folder / "gear.toml", "-o", folder / "out", "--samples", "61")
     assert_refused(other, "table: holds a sweep of other settings (plan, variants)")
 
 
@@ -166,7 +168,7 @@ def test_a_list_of_variants_may_be_the_best_of_a_sweep(folder, tmp_path):
 
 def test_a_quick_sweep_is_coarse_short_and_says_so(folder, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(sweep_command, "_QUICK_SAMPLES", 60)
+    monkeypatch.setattr(SWEEPS, "_QUICK_SAMPLES", 60)
     fine = SWEEP.replace("positions = 16", "positions = 4096").replace("samples = 60", "samples = 5000")
     (tmp_path / "gear.toml").write_text(fine)
     result = sweep("gear.toml", "--quick")
@@ -192,22 +194,21 @@ def test_failed_variants_are_loud(folder, tmp_path, monkeypatch):
     assert list(jg.open_sweep(tmp_path / "out" / "table").column("status")) == 60 * ["more_pairs_needed"]
 
 
-def test_a_slow_sweep_tells_how_far_it_is_before_the_next_tenth(tmp_path, monkeypatch, capsys):
-    clock = [0.0]
-    monkeypatch.setattr(progress.time, "perf_counter", lambda: clock[0])
-    meter = progress.Meter(tmp_path)
+def test_a_slow_sweep_tells_how_far_it_is_before_the_next_tenth(monkeypatch):
+    clock, stages = [0.0], []
+    monkeypatch.setattr(SWEEPS.time, "perf_counter", lambda: clock[0])
+    meter = SWEEPS._Meter(Stages(lambda progress: progress.done is None and stages.append(progress.stage)))
     for done in range(0, 6):
         meter(done, 1000, None)
         clock[0] += 20.0
-    lines = [line for line in capsys.readouterr().err.splitlines() if "of 1,000 variants" in line]
-    assert [line.split()[1] for line in lines] == ["2", "4"]
+    assert [stage.partition(",")[0] for stage in stages] == ["2 of 1", "4 of 1"]
 
 
 def test_interrupted_while_drawing_it_says_what_is_there(folder, monkeypatch):
     folder, _ = folder
-    monkeypatch.setattr("jaxgear.cli.sweep.write_figures", lambda *_: signal.raise_signal(signal.SIGINT))
+    monkeypatch.setattr(sweep_result, "figures_of", lambda *_: signal.raise_signal(signal.SIGINT))
     result = call("sweep", folder / "gear.toml", "-o", folder / "out")
-    line = f"the table and best.csv are complete in {folder / 'out'}{os.sep}, not all figures are drawn"
+    line = f"all tables are complete in {folder / 'out'}{os.sep}, not all figures are drawn"
     assert result.code == 130 and result.err.splitlines()[-1] == f"jaxgear: interrupted, {line}"
 
 
@@ -303,7 +304,7 @@ def test_a_wrong_sweep_is_refused_before_anything_is_written(tmp_path, monkeypat
     (tmp_path / "empty.csv").write_text("height\n")
     (tmp_path / "bad.parquet").write_text("no")
     if fragments is None:
-        sweep_request(load_design("gear.toml"))  # the control: this one is right
+        asked_sweep(load_design("gear.toml"))  # the control: this one is right
     else:
         assert_refused(sweep("gear.toml"), *fragments)
     assert not (tmp_path / "results").exists()
@@ -311,7 +312,7 @@ def test_a_wrong_sweep_is_refused_before_anything_is_written(tmp_path, monkeypat
 
 def test_the_example_asks_for_a_million():
     example = Path(__file__).parents[1] / "examples" / "sweep_19_48.toml"
-    request = sweep_request(load_design(example))
+    request = asked_sweep(load_design(example))
     assert request.plan.size == 1_000_000 and request.load.torques.tolist() == [50.0]
 
 
@@ -326,7 +327,7 @@ def test_a_file_without_a_sweep_or_variables_is_refused(tmp_path):
 def test_requests_cover_all_that_a_file_can_say(tmp_path):
     def request(old, new):
         (tmp_path / "gear.toml").write_text(SWEEP.replace(old, new))
-        return sweep_request(load_design(tmp_path / "gear.toml"))
+        return asked_sweep(load_design(tmp_path / "gear.toml"))
 
     assert request('"latin_hypercube"', '"sobol"\nseed = 4').plan.describe()["seed"] == 4
     factorial = request('"latin_hypercube"\nsamples = 60', '"full_factorial"\nlevels = { height = [3.0, 5.0] }').plan
@@ -336,7 +337,7 @@ def test_requests_cover_all_that_a_file_can_say(tmp_path):
     assert load.weights.tolist() == [0.75, 0.25]
     gears = request("[sweep]", "[tolerance]\nquality_class = [5, 6]\nsamples = 8\nseed = 2\n[sweep]").manufactured
     assert (gears.samples, gears.seed) == (8, 2) and gears.tolerance.pinion.helix_slope is None
-    assert request("[sweep]", "[sweep]").tolerance is None
+    assert request("[sweep]", "[sweep]").manufactured is None
 
 
 @pytest.mark.parametrize(

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from catalogue import gear_pair
 from commands import call
+from design_texts import asked_sweep
 from pyarrow import parquet
 from report_page import check_report
 
@@ -22,17 +23,15 @@ from jaxgear import plot
 from jaxgear.contact import removed_material
 from jaxgear.io import (
     DesignFileError,
+    Search,
     load_design,
-    optimize_request,
     read_flank,
     read_worn,
-    sweep_request,
-    wear_request,
     write_worn,
 )
 from jaxgear.io.folder import RESULT_FILES
 from jaxgear.io.tolerance_table import manufactured_of
-from jaxgear.studies import Checkpoints, NamedArrays, WearResult, wear_scatter
+from jaxgear.studies import Checkpoints, NamedArrays, WearResult, WearStudy, wear_scatter
 from jaxgear.studies.checkpoints import Marches
 from jaxgear.studies.comparison import compared, sought
 from jaxgear.tolerance import deviated_material
@@ -154,9 +153,9 @@ def test_the_figures_of_worn_flanks_show_every_design(monkeypatch):
         )
         for times, name in enumerate(("unmodified", "rule-based", "optimum"), 1)
     }
-    request = SimpleNamespace(settings=SimpleNamespace(dynamics=None))
+    settings = SimpleNamespace(dynamics=None)
     monkeypatch.setattr(plot, "wear_history", lambda *given: None)
-    drawn = WearResult.figures(SimpleNamespace(histories=lives, request=request, scatters={}))
+    drawn = WearResult.figures(SimpleNamespace(histories=lives, settings=settings, scatters={}))
     for gear in ("pinion", "wheel"):
         panels = np.ravel(drawn[f"worn_{gear}"])
         assert [panel.get_title() for panel in panels] == list(lives)
@@ -201,17 +200,17 @@ def test_what_is_wrong_with_the_table_is_one_line(file, tmp_path, text, message)
 def test_a_design_file_binds_names_to_its_settings(file):
     """The settings of the table, and a refusal in one line without them."""
     text = PAIR + SWEEP.format(name="worn_ppte")
-    results = sweep_request(load_design(file(text + TABLE))).results
-    settings = wear_request(load_design(file(text + TABLE))).settings
+    results = asked_sweep(load_design(file(text + TABLE))).results
+    settings = WearStudy.of(load_design(file(text + TABLE))).settings
     assert results == ("ppte", settings.quantity("worn_ppte"))
     with pytest.raises(DesignFileError, match=r'sweep.results\[1\]: "worn_ppte" needs the table \[wear\]'):
-        sweep_request(load_design(file(text)))
+        asked_sweep(load_design(file(text)))
     of_increments = TABLE.replace("blocks = 4", "largest_increment = 0.1")
     with pytest.raises(DesignFileError, match=r'wear.blocks: missing, "worn_ppte" needs it'):
-        sweep_request(load_design(file(text + of_increments)))
-    assert sweep_request(load_design(file(text + TABLE + "largest_increment = 0.1\n"))).results == results
+        asked_sweep(load_design(file(text + of_increments)))
+    assert asked_sweep(load_design(file(text + TABLE + "largest_increment = 0.1\n"))).results == results
     with pytest.raises(DesignFileError, match='"life_to_ppte" needs wear.ppte_limit'):
-        sweep_request(load_design(file(PAIR + SWEEP.format(name="life_to_ppte") + TABLE)))
+        asked_sweep(load_design(file(PAIR + SWEEP.format(name="life_to_ppte") + TABLE)))
 
 
 def test_the_mesh_has_pairs_for_the_loads_that_wear_it(file):
@@ -225,8 +224,8 @@ def test_loads_of_wear_do_not_follow_a_variable_of_the_load(file):
     text = text.replace("[variables]\n", '[variables]\nn = { low = 500.0, high = 900.0, unit = "rpm" }\n')
     table = TABLE + "torques = [50.0, 150.0]\n"
     with pytest.raises(DesignFileError, match='wear.torques: load.speed is the variable "n", which they do not follow'):
-        sweep_request(load_design(file(text + table)))
-    sweep_request(load_design(file(text + table + "speeds = [500.0, 1000.0]\n")))
+        asked_sweep(load_design(file(text + table)))
+    asked_sweep(load_design(file(text + table + "speeds = [500.0, 1000.0]\n")))
 
 
 def test_a_real_life_can_be_asked_for(file):
@@ -240,11 +239,11 @@ constraint = [{ of = "life_to_depth", low = 7.2e9 }]
 """
     )
     design = load_design(file(PAIR + VARIABLES + table))
-    assert wear_request(design).settings.revolutions == 3.6e9
-    assert optimize_request(design).method == "slp"
+    assert WearStudy.of(design).settings.revolutions == 3.6e9
+    assert Search.of(design).method == "slp"
     beyond = table.replace("life_to_depth", "life_to_ppte").replace("[wear]", "[wear]\nppte_limit = 3.0")
     with pytest.raises(DesignFileError, match=r"constraint\[0\].low: 7.2e\+09 must be at most 3.6e"):
-        optimize_request(load_design(file(PAIR + VARIABLES + beyond)))
+        Search.of(load_design(file(PAIR + VARIABLES + beyond)))
 
 
 LOADS = TABLE + "torques = [50.0, 150.0]\nweights = [3.0, 1.0]\n"
@@ -262,12 +261,12 @@ def test_loads_of_the_table_wear_one_flank_together(file, monkeypatch):
         raise Worn
 
     design = load_design(file(PAIR + SWEEP.format(name="wear_depth") + LOADS))
-    settings = wear_request(design).settings
+    settings = WearStudy.of(design).settings
     assert settings.loads is not None and settings.loads.weights.tolist() == [0.75, 0.25]
     monkeypatch.setattr(importlib.import_module("jaxgear.wear.settings"), "wear", recorded)
     mesh = load_design(file(PAIR)).mesh()
     with pytest.raises(Worn):
-        sweep_request(design).results[1](jg.metrics.Analysis(jg.solve(mesh, 150.0), mesh))
+        asked_sweep(design).results[1](jg.metrics.Analysis(jg.solve(mesh, 150.0), mesh))
     assert asked["load"].torques.tolist() == [50.0, 150.0] and asked["load"].weights.tolist() == [0.75, 0.25]
     assert (float(asked["revolutions"]), asked["blocks"]) == (2e7, 4)
     np.testing.assert_array_equal(asked["coefficient"], 1e-18)
@@ -276,7 +275,7 @@ def test_loads_of_the_table_wear_one_flank_together(file, monkeypatch):
 @pytest.mark.parametrize("weights, told", [("weights = [3.0, 1.0]", "for 75, 25 % of"), ("", "the same share of")])
 def test_the_shares_of_the_torques_are_told(file, weights, told):
     design = load_design(file(PAIR + LOADS.replace("weights = [3.0, 1.0]", weights)))
-    result = WearResult(design, wear_request(design), {}, {}, {})
+    result = WearResult(design, WearStudy.of(design).settings, {}, {}, {})
     shares = result.summary()["shares_of_revolutions"]
     assert told in shares and shares in result.tables()[0].title
 
@@ -288,7 +287,7 @@ def test_a_quantity_under_loads_is_that_of_their_life(file):
     spectrum = jg.LoadSpectrum([50.0, 150.0], [3.0, 1.0])
     perfect = jnp.zeros((2, 1, 16))
     life = wear(mesh, spectrum, 2e7, coefficient=1e-18, blocks=4, deviation=perfect)
-    asked = sweep_request(design).results[1](jg.metrics.Analysis(jg.solve(mesh, 150.0), mesh))
+    asked = asked_sweep(design).results[1](jg.metrics.Analysis(jg.solve(mesh, 150.0), mesh))
     assert float(asked) == pytest.approx(float(wear_depth(life)[-1]), rel=1e-12)
 
 
@@ -306,15 +305,15 @@ FAST = PAIR.replace("torque = 150.0", "torque = 150.0\nspeed = 6000.0").replace(
 
 
 def test_a_dynamic_line_load_needs_a_speed_and_what_vibrates(file):
-    settings = wear_request(load_design(file(FAST + DYNAMICS + DYNAMIC))).settings
+    settings = WearStudy.of(load_design(file(FAST + DYNAMICS + DYNAMIC))).settings
     assert settings.line_load == "dynamic" and settings.dynamics.model == "varying stiffness"
-    static = wear_request(load_design(file(FAST + DYNAMICS + TABLE))).settings
+    static = WearStudy.of(load_design(file(FAST + DYNAMICS + TABLE))).settings
     assert static.dynamics is None  # as before there was such a load
     for text, needs in ((FAST + DYNAMIC, r"the table \[dynamics\]"), (PAIR + DYNAMICS + DYNAMIC, "load.speed")):
         with pytest.raises(DesignFileError, match=f'wear.line_load: "dynamic" needs {needs}'):
-            wear_request(load_design(file(text)))
+            load_design(file(text))
     loads = DYNAMIC + "torques = [50.0, 150.0]\nspeeds = [500.0, 1000.0]\n"  # which have speeds of their own
-    assert wear_request(load_design(file(PAIR + DYNAMICS + loads))).settings.loads.speeds.tolist() == [500.0, 1000.0]
+    assert WearStudy.of(load_design(file(PAIR + DYNAMICS + loads))).settings.loads.speeds.tolist() == [500.0, 1000.0]
     with pytest.raises(DesignFileError, match='wear.line_load: "quick"'):
         load_design(file(PAIR + TABLE + 'line_load = "quick"\n'))
 
@@ -323,7 +322,7 @@ def test_dynamic_factors_over_the_life_are_results_of_a_file(file):
     """Of flanks that wear under either load."""
     asked = SWEEP.format(name="worn_dynamic_factor")
     for table in (TABLE, DYNAMIC):
-        quantity = sweep_request(load_design(file(FAST + DYNAMICS + table + asked))).results[1]
+        quantity = asked_sweep(load_design(file(FAST + DYNAMICS + table + asked))).results[1]
         settings = quantity.settings
         assert settings.dynamics.positions == 16
         assert settings.line_load == ("dynamic" if table is DYNAMIC else "static")
@@ -333,7 +332,7 @@ def test_dynamic_factors_over_the_life_are_results_of_a_file(file):
         (PAIR + DYNAMICS + TABLE, "load.speed"),
     ):
         with pytest.raises(DesignFileError, match=f'sweep.results.1.: "worn_dynamic_factor" needs {needs}'):
-            sweep_request(load_design(file(text + asked)))
+            asked_sweep(load_design(file(text + asked)))
 
 
 @pytest.mark.slow
@@ -358,7 +357,7 @@ TOLERANCE = "[tolerance]\nquality_class = 7\nsamples = 3\n"
 
 def scatter(design, flanks, kept):
     """Lives of the manufactured pairs of a file, with reliefs of one height."""
-    mesh, settings = design.mesh(), wear_request(design).settings
+    mesh, settings = design.mesh(), WearStudy.of(design).settings
     designs = {"relieved": (relief(flanks), relief(flanks))}
     gears = manufactured_of(design)
     found = wear_scatter.manufactured_wear(mesh, 150.0, designs, settings, gears, keep=kept)
@@ -450,8 +449,9 @@ def test_a_misalignment_needs_slices(file, tmp_path):
 
 
 def test_a_quick_run_has_few_blocks(file):
-    request = wear_request(load_design(file(PAIR + TABLE.replace("blocks = 4", "largest_increment = 0.1"))), quick=True)
-    assert request.settings.blocks == 4 and request.largest_increment is None
+    text = PAIR + TABLE.replace("blocks = 4", "largest_increment = 0.1")
+    settings = WearStudy.of(load_design(file(text)), quick=True).settings
+    assert settings.blocks == 4 and settings.largest_increment is None
 
 
 VARIABLES = """
@@ -493,7 +493,7 @@ def test_the_command_seeks_the_relief_that_lasts(file, tmp_path, involutes):
 def test_a_search_that_is_for_the_life_already_has_no_other(file):
     def search(text):
         design = load_design(file(PAIR + TABLE + VARIABLES + text))
-        return optimize_request(design).over_life(wear_request(design).settings)
+        return Search.of(design).over_life(WearStudy.of(design).settings)
 
     assert search("") is not None and search('[optimize]\nmethod = "genetic"\n') is not None
     assert search('[optimize]\nobjective = "worn_ppte"\n') is None
@@ -535,7 +535,7 @@ def prepared(pair, *, resolution, compliance=None, support=None):
     return SimpleNamespace(pair=pair, resolution=resolution, compliance=compliance, support=support)
 
 
-class Search:
+class SlowSearch:
     """Stands for a search that takes long."""
 
     method = "slp"
@@ -554,7 +554,7 @@ def test_what_a_search_has_found_is_not_sought_again(tmp_path, file, monkeypatch
     """The mesh on which it ended, and the flanks, come from a few numbers beside the results."""
     monkeypatch.setattr(importlib.import_module("jaxgear.studies.comparison"), "prepare", prepared)
     mesh, stages = load_design(file(PAIR)).mesh(), SimpleNamespace(step=None)
-    search = Search({"amount": 12.3, "length": 2.1})
+    search = SlowSearch({"amount": 12.3, "length": 2.1})
 
     def found(name="optimum", text="", oil=100.0):
         (tmp_path / "oil.toml").write_text(f"viscosity_40 = {oil}\nviscosity_100 = 5.0\n")
@@ -578,7 +578,7 @@ def test_what_a_search_has_found_is_not_sought_again(tmp_path, file, monkeypatch
 def test_a_search_without_numbers_to_keep_gives_its_flanks(tmp_path, file):
     """Although the file has variables, as the transmission-error iteration may."""
     design, stages = load_design(file(PAIR + VARIABLES)), SimpleNamespace(step=None)
-    search = Search({})
+    search = SlowSearch({})
     search.method = "te_iteration"
     mesh, flanks = sought(design, "optimum", search, design.mesh(), Checkpoints(), stages, quick=False)
     assert mesh.resolution.positions == 24 and str(flanks[0]) == str(jg.TipRelief(12.3, 2.1))

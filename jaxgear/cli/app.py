@@ -3,26 +3,25 @@
 JAX and the library are imported when a command runs: help, version and what is wrong with the options need neither.
 """
 
+import inspect
 import os
 import sys
-from collections.abc import Callable, Sequence
-from functools import partial
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, NoReturn
 
 import typer
 from typer.core import TyperGroup
 
-from ..io.first_look import check_keys
+from ..io.first_look import check_keys, known_methods
 from ..provided import provided
 from ..studies import registry
 from ..version import version as own_version
 from . import interrupt, streams
-from .options import File, NoCache, NoFigures, Quick, Reported, output_option, typed
 
-# of `optimize.METHODS` and of the search for flanks without parameters, as a test makes sure
-METHODS = "slp, adam, lbfgs, genetic, cma_es, differential_evolution, factorial, te_iteration, free_form"
-
+Quick = Annotated[
+    bool, typer.Option("--quick", help="Coarse positions and a short search: for a first look, not for a result.")
+]
 OK, NOT_CONVERGED, FAILED, INTERRUPTED = 0, 1, 2, 130
 
 
@@ -36,8 +35,8 @@ class _Commands(TyperGroup):
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
         """The command of a name; None for an unknown one."""
         found = super().get_command(ctx, cmd_name)
-        place = registry.own().get(cmd_name) if found else registry.provided().get(cmd_name)
-        if found is None and (function := _study(place, cmd_name) if place else _named(cmd_name)):
+        place = registry.OWN.get(cmd_name) if found else registry.provided().get(cmd_name)
+        if found is None and (function := command_of(place, cmd_name, _plain) if place else _named(cmd_name)):
             alone = typer.Typer(add_completion=False)
             alone.command(cmd_name, help=_unbroken(function))(function)
             found = typer.main.get_command(alone)
@@ -105,49 +104,11 @@ def new(
 
     A file that is there is never replaced.
     """
+    given = locals()
     with interrupt.importing():
         from .new import new
-    new(
-        file,
-        teeth,
-        module=module,
-        torque=torque,
-        face_width=face_width,
-        speed=speed,
-        helix_angle=helix_angle,
-        pressure_angle=pressure_angle,
-        profile_shift=profile_shift,
-    )
+    new(given.pop("file"), **given)
     return OK
-
-
-def run_place(
-    place: str,
-    context: typer.Context,
-    file: Path,
-    output: Path | None,
-    *,
-    no_figures: bool,
-    reported: bool,
-    no_cache: bool,
-    **options: Any,
-) -> int:
-    """Runs the command of a study.
-
-    Args:
-        place: of its class, as `module:class`.
-        context: of the command line.
-        file, output, no_figures, reported, no_cache: options that all studies have.
-        options: further ones of this study.
-    """
-    if place.startswith("jaxgear."):
-        _look_at(file)
-    with interrupt.importing():
-        from . import run
-
-        study = registry.load(place)
-    shared: dict[str, Any] = {"figures": not no_figures, "cache": not no_cache, "command": typed(context, reported)}
-    return OK if run.run_study(partial(study.of, **options), file, output, **shared) else NOT_CONVERGED
 
 
 def _look_at(file: Path) -> None:
@@ -156,75 +117,80 @@ def _look_at(file: Path) -> None:
         check_keys(file)
 
 
-def _study(place: str, name: str) -> Callable[..., int]:
-    """The command of a study without options of its own.
+def command_of(place: str, name: str, own: Callable[..., Mapping[str, Any]]) -> Callable[..., int]:
+    """The command of a study: its own arguments and options among those of all studies.
 
     Args:
-        place: of its class, as `module:class`.
-        name: of the command.
+        place: place of its class, as `module:class`.
+        name: name of the command.
+        own: function of its own arguments and options that gives the arguments of `AbstractStudy.of`.
     """
+    folder = _FOLDERS.get(name, name)
 
-    def command(
+    def shared(
         context: typer.Context,
-        file: File,
-        output: Annotated[Path | None, output_option(name)] = None,
-        quick: Quick = False,
-        no_figures: NoFigures = False,
-        reported: Reported = False,
-        no_cache: NoCache = False,
-    ) -> int:
-        shared = {"no_figures": no_figures, "reported": reported, "no_cache": no_cache}
-        return run_place(place, context, file, output, **shared, quick=quick)
+        file: Annotated[Path, typer.Argument(metavar="FILE.toml", help="Design file.", show_default=False)],
+        output: Annotated[
+            Path | None,
+            typer.Option("--output", "-o", metavar="DIR", help="Result folder.", show_default=f"results/FILE/{folder}"),
+        ] = None,
+        no_figures: Annotated[bool, typer.Option("--no-figures", help="Write no figures.")] = False,
+        reported: Annotated[
+            bool,
+            typer.Option("--report", help="Write report.html too, a self-contained file (needs jaxgear\\[report])."),
+        ] = False,
+        no_cache: Annotated[
+            bool, typer.Option("--no-cache", envvar="JAXGEAR_NO_CACHE", help="Do not keep compiled programs on disk.")
+        ] = False,
+    ) -> Mapping[str, Any]:
+        return {
+            "file": file,
+            "output": output,
+            "figures": not no_figures,
+            "cache": not no_cache,
+            "command": list(context.obj) if reported else None,
+        }
 
+    def command(**given: Any) -> int:
+        if place.startswith("jaxgear."):
+            _look_at(given["file"])
+        options = own(**{key: given.pop(key) for key in inspect.signature(own).parameters})
+        with interrupt.importing():
+            from . import run
+
+            study = registry.load(place)
+        return OK if run.run_study(study, options, **shared(**given)) else NOT_CONVERGED
+
+    (context, file, output, *flags), of_study = (
+        [*inspect.signature(function).parameters.values()] for function in (shared, own)
+    )
+    required = [one for one in of_study if one.default is one.empty]
+    optional = [one for one in of_study if one.default is not one.empty]
+    keywords = [one.replace(kind=one.KEYWORD_ONLY) for one in (context, file, *required, output, *optional, *flags)]
+    command.__signature__ = inspect.Signature(keywords)  # type: ignore[attr-defined]
+    command.__annotations__ = {one.name: one.annotation for one in keywords}
     return command
 
 
-@app.command()
-def analyze(
-    context: typer.Context,
-    file: File,
-    output: Annotated[Path | None, output_option("analyze")] = None,
-    no_figures: NoFigures = False,
-    reported: Reported = False,
-    no_cache: NoCache = False,
-) -> int:
-    """Analyze the unmodified pair and the modification of the design file."""
-    shared = {"no_figures": no_figures, "reported": reported, "no_cache": no_cache}
-    return run_place("jaxgear.studies.design_analysis:DesignAnalysis", context, file, output, **shared)
+def _analyze() -> dict[str, Any]:
+    return locals()
 
 
-@app.command()
-def optimize(
-    context: typer.Context,
-    file: File,
-    output: Annotated[Path | None, output_option("optimize/METHOD")] = None,
+def _plain(quick: Quick = False) -> dict[str, Any]:
+    return locals()
+
+
+def _optimize(
     method: Annotated[
-        str | None, typer.Option("--method", "-m", metavar="NAME", help=f"In place of the file's: {METHODS}, pareto.")
+        str | None,
+        typer.Option("--method", "-m", metavar="NAME", help=f"In place of the file's: {', '.join(known_methods())}."),
     ] = None,
     quick: Quick = False,
-    no_figures: NoFigures = False,
-    reported: Reported = False,
-    no_cache: NoCache = False,
-) -> int:
-    """Find the best variables or flanks by the method and for the objective of the design file.
-
-    Without a word about them that is the least peak-to-peak transmission error (PPTE) at the design torque. Compares
-    the unmodified pair, the rule-based tip relief of ISO 6336-1, and the optimum.
-    """
-    shared = {"no_figures": no_figures, "reported": reported, "no_cache": no_cache}
-    place = "jaxgear.studies.optimization:DesignOptimization"
-    return run_place(place, context, file, output, **shared, method=method, quick=quick)
+) -> dict[str, Any]:
+    return locals()
 
 
-for _name, _place in registry.own().items():
-    app.command(_name)(_study(_place, _name))
-
-
-@app.command()
-def sweep(
-    context: typer.Context,
-    file: File,
-    output: Annotated[Path | None, output_option("sweep")] = None,
+def _sweep(
     samples: Annotated[
         int | None, typer.Option(min=1, metavar="N", help="Number of variants in place of the file's.")
     ] = None,
@@ -238,31 +204,22 @@ def sweep(
         bool, typer.Option("--distributed", help="Share the sweep among the processes of a cluster job (Slurm, MPI).")
     ] = False,
     quick: Quick = False,
-    no_figures: NoFigures = False,
-    reported: Reported = False,
-    no_cache: NoCache = False,
-) -> int:
-    """Evaluate the variants that the design file asks for, any number of them, into a table of Parquet files.
-
-    The folder "table" of the results holds it and nothing else: pandas, polars and Arrow read it as a whole. An
-    interrupted sweep goes on where it was when the command is repeated.
-    """
-    _look_at(file)
+) -> dict[str, Any]:
     with interrupt.importing():
-        from . import devices, sweep
+        from . import devices
     devices.use_all_cores()
     devices.join_processes(coordinator, processes, process, automatic=distributed)
-    fine = sweep.run_sweep(
-        file,
-        output,
-        samples=samples,
-        best=best,
-        quick=quick,
-        figures=not no_figures,
-        cache=not no_cache,
-        command=typed(context, reported),
-    )
-    return OK if fine else NOT_CONVERGED
+    return {"samples": samples, "best": best, "quick": quick}
+
+
+_FOLDERS = {"optimize": "optimize/METHOD"}
+_OWN: Mapping[str, Callable[..., Mapping[str, Any]]] = {
+    "analyze": _analyze,
+    "optimize": _optimize,
+    "sweep": _sweep,
+}
+for _name, _place in registry.OWN.items():
+    app.command(_name)(command_of(_place, _name, _OWN.get(_name, _plain)))
 
 
 for _command in app.registered_commands:

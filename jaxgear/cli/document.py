@@ -171,7 +171,7 @@ def document(command: Sequence[str] | None, file: Path, *libraries: str) -> Docu
 
 def project_facts(design: DesignFile) -> list[tuple[str, str]]:
     """Whose gears these are."""
-    given = design.tables["project"].given() if "project" in design.tables else {}
+    given = design.tables["project"].fields if "project" in design.tables else {}
     return [(_PROJECT.get(name, name), said) for name, said in given.items()]
 
 

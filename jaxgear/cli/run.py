@@ -1,35 +1,34 @@
 """The command of a study: asked for, worked out, put in place, printed."""
 
+import dataclasses
 import importlib
 import os
 import threading
-from collections.abc import Callable, Sequence
-from contextlib import ExitStack
-from dataclasses import replace
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import jax
 
-from ..io import (
-    DesignFile,
-    load_design,
-    result_folder,
-)
+from ..io import DesignFile, load_design, result_folder
 from ..numerics import compile_quickly
-from ..studies import AbstractStudy, Checkpoints, write_results
+from ..studies import AbstractStudy, Checkpoints, Progress, write_results
 from ..studies.results import save_figures
 from ..studies.study import AbstractStudyResult
+from ..studies.summary_data import versions
 from . import interrupt, streams, terminal
 from .cache import enable_cache
-from .document import CommandResult, document
+from .document import CommandResult, document, project_facts
 from .progress import Stages
 
 _FIGURES = ("matplotlib.pyplot",)
 
 
 def run_study(
-    asked_for: Callable[[DesignFile], AbstractStudy[Any]],
+    of: type[AbstractStudy[Any]],
+    options: Mapping[str, Any],
     file: Path,
     output: Path | None,
     *,
@@ -40,47 +39,50 @@ def run_study(
     """The command of a study with its options; False when there are failures.
 
     Args:
-        asked_for: makes the study of the design file.
+        of: class of the study.
+        options: arguments of `of.of` besides the design file.
         file: the design file.
         output: result folder; None for that of the study.
         figures: whether figures are drawn.
         cache: whether compiled programs are kept on disk.
         command: the command line, where a report is written.
     """
-    asked = document(command, file)
-    compile_quickly()
+    asked = document(command, file, *of.report_needs)
+    if not of.grows:
+        compile_quickly()
     with Stages() as stages:
         design = opened(file, cache=cache)
-        study = asked_for(design)
+        study = of.of(design, **options)
         target = output or default_folder(file, study.folder, quick=study.quick)
-        checkpoints, omitted = _checkpoints(target), study.omits()
-        with ExitStack() as putting_in_place, result_folder(target, study.files) as folder:
-            stages.replaces(target)
+        omitted = study.omits()
+        if study.grows:
+            study = dataclasses.replace(study, output=target)  # type: ignore[call-arg]
+        checkpoints = Checkpoints() if study.grows else _checkpoints(target)
+        with ExitStack() as putting_in_place, _folder(study, target, stages) as folder:
             _import_ahead(*study.needs, *_FIGURES * figures)
-            result = study.run(checkpoints=checkpoints, callback=stages.shown)
+            result = study.run(checkpoints=checkpoints, callback=partial(_told, study, target, stages))
+            if jax.process_index() > 0:  # the first process speaks for all
+                return not list(result.failures())
             figures = figures and type(result).figures is not AbstractStudyResult.figures
             stages.begin("writing the results")
             data, _ = write_results(folder, study, result, figures=False)
-            findings = result.findings()
-            found = CommandResult(
-                lines=list(result.verdict()),
-                warnings=list(result.failures()),
-                findings=None if findings is None else list(findings),
-                tables=list(result.tables()),
-                pages=result.chapters(),
-                assumptions=(*result.assumptions, *([f"{omitted}."] if omitted else [])),
-                left_out=study.left_out,
-                first=list(result.headlines()),
-                details=list(result.details()),
-            )
+            if study.grows:
+                interrupt.note(f"all tables are complete in {target}{os.sep}, not all figures are drawn")
+            found = _found(study, result, omitted)
             _show(found, stages)
+            if figures:
+                _without_windows()
+            if asked is not None:
+                stages.begin("preparing the report")
+                facts = [*project_facts(design), *asked.facts, *versions().items()]
+                result = result.reported(folder, facts, figures=figures)
             files = []
             if figures:
                 stages.begin("drawing the figures")
-                _without_windows()
                 files = save_figures(folder, result.figures())
             if asked is not None:
-                asked.write(folder, design, data, replace(found, figures=files))
+                shown = dataclasses.replace(_found(study, result, omitted), figures=files)
+                asked.write(folder, design, data, shown)
             putting_in_place.enter_context(interrupt.held(f"the results are in {target}{os.sep}"))
             putting_in_place.callback(checkpoints.remove)
     if study.quick and study.coarse:
@@ -90,6 +92,40 @@ def run_study(
         if line:
             terminal.warn(line)
     return not found.warnings
+
+
+@contextmanager
+def _folder(study: AbstractStudy[Any], target: Path, stages: Stages) -> Iterator[Path]:
+    """Folder of the results: a new one that takes the place of the target at the end, or the one in which they grow."""
+    if study.grows:
+        yield target
+        return
+    with result_folder(target, study.files) as folder:
+        stages.replaces(target)
+        yield folder
+
+
+def _told(study: AbstractStudy[Any], target: Path, stages: Stages, progress: Progress) -> None:
+    """Shows how far a study is; the message of an interruption says where a growing result is."""
+    if study.grows and progress.total:
+        there = f"{progress.done or 0:,} of {progress.total:,} {study.grows} are in {target}{os.sep}"
+        interrupt.note(f"{there}, resume with the same command")
+    stages.shown(progress)
+
+
+def _found(study: AbstractStudy[Any], result: AbstractStudyResult, omitted: str) -> CommandResult:
+    findings = result.findings()
+    return CommandResult(
+        lines=list(result.verdict()),
+        warnings=list(result.failures()),
+        findings=None if findings is None else list(findings),
+        tables=list(result.tables()),
+        pages=result.chapters(),
+        assumptions=(*result.assumptions, *([f"{omitted}."] if omitted else [])),
+        left_out=study.left_out,
+        first=list(result.headlines()),
+        details=list(result.details()),
+    )
 
 
 def _show(found: CommandResult, stages: Stages) -> None:

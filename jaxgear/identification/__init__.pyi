@@ -5,5 +5,5 @@ from .estimate import identify as identify
 from .estimate import period_of as period_of
 from .measured_te import read_measurement as read_measurement
 from .measurement import Measurement as Measurement
-from .study import DesignIdentification as DesignIdentification
 from .study import IdentificationResult as IdentificationResult
+from .study import IdentificationStudy as IdentificationStudy

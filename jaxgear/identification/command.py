@@ -5,17 +5,16 @@ from typing import Annotated, Any
 
 import typer
 
-from ..cli.app import run_place
-from ..cli.options import File, NoCache, NoFigures, Quick, Reported, output_option
+from ..cli.app import Quick, command_of
+from ..studies.registry import help_of
+
+_PLACE = "jaxgear.identification.study:IdentificationStudy"
 
 
-def identify(
-    context: typer.Context,
-    file: File,
+def _options(
     measured: Annotated[
         Path, typer.Argument(metavar="TE.csv", help="Measured transmission error.", show_default=False)
     ],
-    output: Annotated[Path | None, output_option("identify")] = None,
     noise: Annotated[
         float | None, typer.Option(metavar="UM", help="Standard deviation of a reading in um; else that of repeats.")
     ] = None,
@@ -29,16 +28,9 @@ def identify(
         bool, typer.Option("--pitch", help="Pitch deviations are unknown too, from readings of whole revolutions.")
     ] = False,
     quick: Quick = False,
-    no_figures: NoFigures = False,
-    reported: Reported = False,
-    no_cache: NoCache = False,
-) -> int:
-    """Find the values of the variables that gave a measured transmission error, and how well it tells them.
+) -> dict[str, Any]:
+    return locals()
 
-    The file has the columns torque_Nm, te_um, and phase (base pitches) or angle_deg (of the pinion). An error that is
-    an angle names its shaft and unit: te_wheel_arcsec, te_pinion_deg.
-    """
-    shared = {"no_figures": no_figures, "reported": reported, "no_cache": no_cache}
-    unknown: dict[str, Any] = {"noise": noise, "torque_scale": torque_scale, "offset": offset, "pitch": pitch}
-    place = "jaxgear.identification.study:DesignIdentification"
-    return run_place(place, context, file, output, **shared, measured=measured, quick=quick, **unknown)
+
+identify = command_of(_PLACE, "identify", _options)
+identify.__doc__ = help_of(_PLACE)

@@ -55,8 +55,11 @@ class _Flanks(eqx.Module):
 
 
 @dataclass(frozen=True)
-class DesignIdentification(AbstractStudy["IdentificationResult"]):
-    """Find the values of the variables of a design file that gave a measured transmission error.
+class IdentificationStudy(AbstractStudy["IdentificationResult"]):
+    """Find the values of the variables that gave a measured transmission error, and how well it tells them.
+
+    The file has the columns torque_Nm, te_um, and phase (base pitches) or angle_deg (of the pinion). An error that is
+    an angle names its shaft and unit: te_wheel_arcsec, te_pinion_deg.
 
     Attributes:
         measured: file of the data.

@@ -2,17 +2,15 @@
 
 from .design_file import DesignFile as DesignFile
 from .design_file import load_design as load_design
-from .dynamics_table import DynamicsRequest as DynamicsRequest
-from .dynamics_table import dynamics_request as dynamics_request
+from .dynamics_table import DynamicsSection as DynamicsSection
 from .errors import DesignFileError as DesignFileError
 from .flanks import read_flank as read_flank
 from .folder import result_folder as result_folder
 from .folder import writing as writing
-from .layout_table import LayoutRequest as LayoutRequest
-from .layout_table import layout_request as layout_request
+from .layout_table import LayoutSection as LayoutSection
 from .named_quantities import quantities_of_tables as quantities_of_tables
-from .optimize_table import OptimizeRequest as OptimizeRequest
-from .optimize_table import optimize_request as optimize_request
+from .optimize_table import OptimizeSection as OptimizeSection
+from .optimize_table import Search as Search
 from .rating import LubricantSection as LubricantSection
 from .reference import reference as reference
 from .results import describe as describe
@@ -24,11 +22,9 @@ from .results import write_traces as write_traces
 from .results import write_wheel_drawing as write_wheel_drawing
 from .results import write_wheel_points as write_wheel_points
 from .rows import read_variants as read_variants
-from .sweep_table import SweepRequest as SweepRequest
-from .sweep_table import sweep_request as sweep_request
+from .sweep_table import SweepSection as SweepSection
 from .teeth_table import teeth_of as teeth_of
-from .wear_table import WearRequest as WearRequest
-from .wear_table import wear_request as wear_request
+from .wear_table import WearSection as WearSection
 from .worn import read_worn as read_worn
 from .worn import write_worn as write_worn
 from .write_design import write_design as write_design

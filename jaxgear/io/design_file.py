@@ -37,10 +37,11 @@ from .gears import (
     materials_of,
     pair_of,
     quality_of,
+    with_quality,
 )
 from .model_table import ModelSection, ResolutionSection, model_part, resolution_of, with_tables
-from .table_keys import FileTable, Key, decode, described, entry, nested, part_of, section_of, summary
-from .tables import FurtherTable, LoadSection, Rest, further_tables
+from .table_keys import FileTable, decode, entry, nested, part_of, summary
+from .tables import FurtherTable, LoadSection, further_tables
 from .template import Free, Part, build
 from .toml import read
 from .value_types import list_of, table, text
@@ -63,9 +64,8 @@ _TORQUE_RANGE = (0.5, 2.0)
 
 # Tables that know the drive flanks alone: the line of action of their force, or the order in which positions follow.
 _OF_DRIVE_FLANKS = "dynamics", "layout", "misalignment", "teeth", "wear"
+_CLASSIFIED = "layout", "tolerance"  # tables with flank tolerance classes
 _ONLY_DRIVE = "which {} does not know: give a positive torque"
-
-_MISALIGNMENT = section_of(Misalignment)
 
 
 class FileSection(FileTable):
@@ -91,10 +91,10 @@ class FileSection(FileTable):
     wheel: GearSection = entry(nested(GearSection), ...)
     load: LoadSection = entry(nested(LoadSection), ...)
     title: str | None = entry(text())
-    materials: dict[str, Part] | None = entry(table(described(Material)))
+    materials: dict[str, Part] | None = entry(table(nested(Material)))
     pair: PairSection = entry(nested(PairSection), PairSection("pair"))
     model: ModelSection = entry(nested(ModelSection), ModelSection("model"))
-    misalignment: FileTable = entry(nested(_MISALIGNMENT), _MISALIGNMENT("misalignment"))
+    misalignment: Part = entry(nested(Misalignment), Part(Misalignment, {}, "misalignment"))
     resolution: FileTable = entry(nested(ResolutionSection), ResolutionSection("resolution"))
     variables: dict[str, VariableSection] = entry(table(nested(VariableSection)), {})
     shafts: list[gearbox.ShaftSection] = entry(list_of(nested(gearbox.ShaftSection), empty=True), [])
@@ -105,7 +105,7 @@ class FileSection(FileTable):
 def file_section(further: Mapping[str, type[FurtherTable]]) -> type[FileSection]:
     """The keys of a whole file with further tables."""
     texts = {name: summary(cls) for name, cls in further.items()}
-    keys = {name: Key(table(), meaning=text[:1].lower() + text[1:]) for name, text in texts.items()}
+    keys = {name: replace(table(), meaning=text[:1].lower() + text[1:]) for name, text in texts.items()}
     return type("FileSection", (FileSection,), {**keys, "__doc__": FileSection.__doc__})
 
 
@@ -242,13 +242,13 @@ class DesignFile:
         """
         if section.torques is None:
             known = [name for name in ("weights", "speeds") if name in section.keys]
-            section.refuse(known, f" without {section.at}.torques")
+            section.refuse(known, f" without {section.key}.torques")
         torques, speeds = section.torques or [self.torque], getattr(section, "speeds", None)
         run_at = {"speeds": self.speed if speeds is None else speeds, "friction": self.friction}
-        key = f"{section.at}.{'torques' if speeds is None else 'speeds'}"
+        key = f"{section.key}.{'torques' if speeds is None else 'speeds'}"
         load = refused(key, LoadSpectrum, torques, **run_at)
         given = section.weights
-        return load if given is None else refused(f"{section.at}.weights", LoadSpectrum, torques, given, **run_at)
+        return load if given is None else refused(f"{section.key}.weights", LoadSpectrum, torques, given, **run_at)
 
     @property
     def materials(self) -> tuple[str | None, str | None]:
@@ -262,6 +262,11 @@ class DesignFile:
             parameters: value of every free parameter, they may be tracers; None for the middle of their bounds.
         """
         return self._middle.pair if parameters is None else self._mesh.pair.build(parameters)
+
+    @property
+    def compliance(self) -> AbstractCompliance:
+        """The stiffness model, with all variables in the middle of their bounds."""
+        return self._middle.compliance
 
     @property
     def _meshing(self) -> GearPair:
@@ -398,10 +403,9 @@ def load_design(path: str | Path) -> DesignFile:
     """
     file = Path(path)
     with naming(file):
-        design = _read(file, read(file))
-        for each in design.tables.values():
-            if isinstance(each, FurtherTable):
-                each.check(design)
+        design, sections = _read(file, read(file))
+        for each in sections:
+            each.check(design)
     return design
 
 
@@ -418,7 +422,7 @@ def _check_coast(says: Mapping[str, Any], torque: float) -> None:
             raise DesignFileError("load.torque", problem)
 
 
-def _read(file: Path, says: dict[str, Any]) -> DesignFile:
+def _read(file: Path, says: dict[str, Any]) -> tuple[DesignFile, list[FurtherTable]]:
     further = {name: cls for name, cls in further_tables().items() if name not in FileSection.keys}
     top = decode("", says, file_section(further))
     folder, load = file.parent, top.load
@@ -429,19 +433,19 @@ def _read(file: Path, says: dict[str, Any]) -> DesignFile:
         _check_coast(says, load.torque)
         load, coast = load.changed(torque=-load.torque), True
     materials = materials_of(top.materials)
-    sections = {"pinion": top.pinion, "wheel": top.wheel}
+    gears = {"pinion": top.pinion, "wheel": top.wheel}
     check_pitches(top.pinion, top.wheel)
-    pair = pair_of(top.pair, *(gear_part(section, materials) for section in sections.values()))
+    pair = pair_of(top.pair, *(gear_part(section, materials) for section in gears.values()))
     flanks, unused = (
-        {name: flank_of(section, folder, pair.fields[name], coast=side) for name, section in sections.items()}
+        {name: flank_of(section, folder, pair.fields[name], coast=side) for name, section in gears.items()}
         for side in (coast, not coast)
     )
     others = [part for parts in unused.values() for part in parts]
-    axes, point = part_of(top.misalignment, Misalignment), part_of(load, OperatingPoint)
+    axes, point = top.misalignment, part_of(load, OperatingPoint)
     model = model_part(top.model)
     open_case = [*pair.free(), *model.free(), *axes.free(), *point.free()]
     modifications = [*flanks["pinion"], *flanks["wheel"]]
-    empty = [f"{name}.modification" for name, section in sections.items() if section.given().get("modification") == []]
+    empty = [f"{name}.modification" for name, section in gears.items() if section.fields.get("modification") == []]
     open_flanks = [free for part in modifications for free in part.free()]
     behind = [free for part in others for free in part.free()]
     bounds, units, values = read_variables(top.variables, [*open_flanks, *open_case, *behind], empty)
@@ -457,8 +461,9 @@ def _read(file: Path, says: dict[str, Any]) -> DesignFile:
     if axes.key not in uneven:  # zeros are parallel axes
         axes = replace(axes, fields={})
     torque, quality = float(usual.torque), quality_of(top.pinion, top.wheel)
-    rest = Rest(folder, list(says), load, top.model, bounds, quality)
-    tables: dict[str, Any] = {name: cls.read(says[name], rest) for name, cls in further.items() if name in says}
+    sections = {name: cls.read(says[name], folder) for name, cls in further.items() if name in says}
+    sections |= {name: with_quality(sections[name], quality) for name in _CLASSIFIED if name in sections}
+    tables: dict[str, Any] = {name: section.held for name, section in sections.items()}
     layout, support = tables.get("layout"), None
     if layout is None:
         top.refuse(["shafts", "meshes", "housing"], " without [layout]")
@@ -477,7 +482,7 @@ def _read(file: Path, says: dict[str, Any]) -> DesignFile:
     mesh = FileMesh(pair, model, axes, sizes, coast)
     classes = tables["tolerance"].quality_class if "tolerance" in tables else quality
     low, high = load.torque_range or [share * torque for share in _TORQUE_RANGE]
-    return DesignFile(
+    design = DesignFile(
         path=file,
         says=json.dumps(says, sort_keys=True, default=str),
         title=top.title or printable(file.stem),
@@ -487,7 +492,7 @@ def _read(file: Path, says: dict[str, Any]) -> DesignFile:
         speed=None if usual.speed is None else float(usual.speed),
         friction=None if usual.friction is None else float(usual.friction),
         quality_classes=None if classes is None else both_classes(classes),
-        drawn={name: drawing_of(section) for name, section in sections.items()},
+        drawn={name: drawing_of(section) for name, section in gears.items()},
         bounds=bounds,
         units=units,
         values=values,
@@ -500,3 +505,4 @@ def _read(file: Path, says: dict[str, Any]) -> DesignFile:
         _middle=mesh.parts(middle),
         _longest=longest,
     )
+    return design, [*sections.values()]

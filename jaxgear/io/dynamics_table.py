@@ -1,7 +1,5 @@
 """The table [dynamics] of a design file."""
 
-import dataclasses
-
 import numpy as np
 
 from ..dynamics import Dynamics
@@ -9,7 +7,7 @@ from ..dynamics.motion import SAMPLES
 from ..dynamics.quantities import AT_SPEED
 from ..metrics import Quantity
 from .design_file import DesignFile
-from .errors import DesignFileError, naming
+from .errors import DesignFileError
 from .table_keys import entry, part_of, section_of
 from .tables import FurtherTable
 from .value_types import count, list_of, positive
@@ -28,6 +26,8 @@ class DynamicsSection(FurtherTable, section_of(Dynamics, ("mesh_frequencies",), 
             acceleration; no run-up without it.
     """
 
+    table = "dynamics"
+
     mesh_frequencies: list[float] | None = entry(list_of(positive("Hz"), length=2))
     speeds: list[float] | None = entry(list_of(positive("rpm"), length=2))
     number: int = entry(count(2, 10_000), 100)
@@ -35,70 +35,45 @@ class DynamicsSection(FurtherTable, section_of(Dynamics, ("mesh_frequencies",), 
     run_up: float | None = entry(positive("s"))
 
     def check(self, design: DesignFile) -> None:
-        """As a study of all commands does."""
-        dynamics_request(design)
+        """Refuses speeds, torques or a run-up that do not go together."""
+        self.torques(design)
+        self.settings(design)
 
     def quantity(self, design: DesignFile, key: str, quantity: Quantity) -> Quantity:
         """Quantity with the settings of [dynamics]; a quantity of one speed needs load.speed."""
         name = quantity.name
         if name in AT_SPEED and design.speed is None:
             raise DesignFileError(key, f'"{name}" needs load.speed; "worst_{name}" is that of all speeds of [dynamics]')
-        return quantity.with_settings(dynamics_of(design))
+        return quantity.with_settings(self.settings(design))
 
+    def settings(self, design: DesignFile, number: int | None = None) -> Dynamics:
+        """The settings that the table stands for.
 
-_QUICK_NUMBER = 24
-_MINUTE = 60.0  # s
+        Args:
+            design: the design file.
+            number: of speeds; None for that of the table.
 
+        Raises:
+            DesignFileError: for speeds that are no range, and a run-up of less than a mesh cycle for every sample.
+        """
+        frequencies = np.linspace(*_frequencies(design, self), number or self.number)
+        settings = part_of(self, Dynamics).having(mesh_frequencies=frequencies).build({})
+        if self.run_up is not None:
+            cycles = self.run_up * float(settings.mesh_frequencies[0] + settings.mesh_frequencies[-1]) / 2
+            if cycles < SAMPLES:
+                problem = f"{self.run_up:g} s holds {cycles:.0f} mesh cycles, needs {SAMPLES}"
+                raise DesignFileError("dynamics.run_up", problem)
+        return settings
 
-@dataclasses.dataclass(frozen=True)
-class DynamicsRequest:
-    """A study of the vibration over the speed, checked.
-
-    Attributes:
-        settings: speeds, and what vibrates.
-        torques: on the pinion [N m], ascending.
-        run_up: duration of a run-up [s]; None for none.
-    """
-
-    settings: Dynamics
-    torques: tuple[float, ...]
-    run_up: float | None = None
-
-
-def dynamics_request(design: DesignFile, *, quick: bool = False) -> DynamicsRequest:
-    """Checks what a design file says about its dynamics.
-
-    Args:
-        design: the design file.
-        quick: few speeds, for a first look.
-
-    Raises:
-        DesignFileError: for anything that is wrong with it, in one line that names the file and the key.
-    """
-    with naming(design.path):
-        section = design.needed("dynamics", "it says at which speeds the pair runs")
-        factors = section.torque_factors
+    def torques(self, design: DesignFile) -> tuple[float, ...]:
+        """Torques of a study on the pinion [N m], ascending."""
+        factors = self.torque_factors
         if len(set(factors)) != len(factors):
             raise DesignFileError("dynamics.torque_factors", "must all be different")
-        settings = dynamics_of(design, _QUICK_NUMBER if quick else None)
-        _check_run_up(settings, section.run_up)
-        return DynamicsRequest(settings, tuple(factor * design.torque for factor in sorted(factors)), section.run_up)
+        return tuple(factor * design.torque for factor in sorted(factors))
 
 
-def _check_run_up(settings: Dynamics, duration: float | None) -> None:
-    """At least one mesh cycle for every sample."""
-    if duration is None:
-        return
-    cycles = duration * float(settings.mesh_frequencies[0] + settings.mesh_frequencies[-1]) / 2
-    if cycles < SAMPLES:
-        raise DesignFileError("dynamics.run_up", f"{duration:g} s holds {cycles:.0f} mesh cycles, needs {SAMPLES}")
-
-
-def dynamics_of(design: DesignFile, number: int | None = None) -> Dynamics:
-    """The settings of the table [dynamics], which the file has, at a number of speeds; None for that of the file."""
-    section = design.tables["dynamics"]
-    frequencies = np.linspace(*_frequencies(design, section), number or section.number)
-    return part_of(section, Dynamics).having(mesh_frequencies=frequencies).build({})
+_MINUTE = 60.0  # s
 
 
 def _frequencies(design: DesignFile, section: DynamicsSection) -> tuple[float, float]:

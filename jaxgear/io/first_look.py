@@ -16,6 +16,7 @@ from .trade_words import unknown_key
 
 MODIFICATION, MATERIAL, VARIABLE = "modification of type {}", "material", "variable"
 GEARS = "pinion", "wheel"
+METHODS = "optimize.method"
 KEYS = Path(__file__).with_name("keys.json")
 
 
@@ -32,6 +33,11 @@ def check_keys(path: Path) -> None:
             unknown = next((name for name in table if name not in known.get(kind, table)), None)
             if unknown is not None:
                 raise DesignFileError(join(key, unknown), unknown_key(unknown, known[kind]))
+
+
+def known_methods() -> list[str]:
+    """Names of the methods of a search."""
+    return json.loads(KEYS.read_text(encoding="utf-8"))[METHODS]
 
 
 def _tables(says: Mapping[str, Any]) -> Iterator[tuple[str, Mapping[str, Any], str]]:

@@ -203,15 +203,15 @@ def flank_part(section: FlankFileSection, folder: Path, base_radius: float | Non
         base_radius: of the gear [mm]; None where variables decide it, the file then needs roll lengths.
     """
     path = folder / section.file
-    with referring(f"{section.at}.file", path.name):
+    with referring(f"{section.key}.file", path.name):
         rows = read_rows(path)
         gear = section.gear
         if gear is None and _GEAR in rows[0]:
-            gear = section.at.partition(".")[0]
+            gear = section.key.partition(".")[0]
         method: Any = section.method
         rows = _at_life(_chosen(rows, {_GEAR: gear, "design": section.design}), section.revolutions)
         flank, reach = flank_of_rows(rows, base_radius, method)
-    return template.Part(_FromFile(path.name, reach), {"flank": flank}, section.at)
+    return template.Part(_FromFile(path.name, reach), {"flank": flank}, section.key)
 
 
 def check_files(parts: Mapping[str, Sequence[template.Part]], pair: GearPair) -> None:

@@ -30,18 +30,18 @@ from ..shafts import (
 from ..shafts import Section as ShaftPart
 from .errors import DesignFileError, check_file, referring, refused
 from .gears import MATERIAL, GearSection, Materials, fixed_gear, fixed_material
-from .table_keys import FileTable, built, decode, entry, nested, section_of
+from .table_keys import FileTable, entry, nested, section_of
 from .template import Part
 from .value_types import Kind, list_of, switch, table, text
 
 
-def _bearing(key: str, value: Any) -> FileTable:
-    return decode(key, value, _MATRIX_BEARING if "stiffness" in table().read(key, value) else _BEARING)
+def _bearing(key: str, value: Any) -> Part:
+    cls = MatrixBearing if "stiffness" in table().read(key, value) else Bearing
+    return nested(cls, open=False).read(key, value)
 
 
-_PART, _COUPLING, _LOAD = (section_of(cls, open=False) for cls in (ShaftPart, Coupling, ShaftLoad))
-_BEARING, _MATRIX_BEARING = section_of(Bearing, open=False), section_of(MatrixBearing, open=False)
-_MISALIGNMENT = section_of(Misalignment, open=False)
+def _several(cls: type[Any], *, empty: bool = True) -> Kind:
+    return list_of(nested(cls, open=False), empty=empty)
 
 
 class MountedGearSection(section_of(MountedGear, ("name", "gear"), open=False)):  # type: ignore[misc]
@@ -73,11 +73,11 @@ class ShaftSection(FileTable):
     """
 
     name: str = entry(text(), ...)
-    sections: list[FileTable] = entry(list_of(nested(_PART)), ...)
-    bearings: list[FileTable] = entry(list_of(Kind("a table", _bearing)), ...)
+    sections: list[Part] = entry(_several(ShaftPart, empty=False), ...)
+    bearings: list[Part] = entry(list_of(Kind("a table", _bearing)), ...)
     gears: list[MountedGearSection] = entry(list_of(nested(MountedGearSection), empty=True), [])
-    couplings: list[FileTable] = entry(list_of(nested(_COUPLING), empty=True), [])
-    loads: list[FileTable] = entry(list_of(nested(_LOAD), empty=True), [])
+    couplings: list[Part] = entry(_several(Coupling), [])
+    loads: list[Part] = entry(_several(ShaftLoad), [])
     material: str | Part | None = entry(MATERIAL)
 
 
@@ -92,7 +92,7 @@ class MeshSection(section_of(GearMesh, ("pinion", "wheel", "misalignment"), open
 
     pinion: str = entry(text(), ...)
     wheel: str = entry(text(), ...)
-    misalignment: FileTable | None = entry(nested(_MISALIGNMENT))
+    misalignment: Part | None = entry(nested(Misalignment, open=False))
 
 
 class HousingSection(FileTable):
@@ -213,7 +213,7 @@ def _check_names(shafts: Sequence[ShaftSection]) -> None:
     for parts in (shafts, bearings, gears):
         first: dict[str, str] = {}
         for part in parts:
-            key, name = f"{part.at}.name", part.given()["name"]
+            key, name = f"{part.key}.name", part.fields["name"]
             if first.setdefault(name, key) != key:
                 raise DesignFileError(key, f'"{name}" is given twice, first as {first[name]}')
 
@@ -222,14 +222,14 @@ def _shaft(section: ShaftSection, pair: GearPair, materials: Materials) -> Shaft
     material = fixed_material(section, section.material, materials)
     gears = [_gear(each, pair, materials, material) for each in section.gears]
     sections, bearings, couplings, loads = (
-        [built(each) for each in several]
+        [each.build({}) for each in several]
         for several in (section.sections, section.bearings, section.couplings, section.loads)
     )
-    return refused(section.at, Shaft, section.name, sections, bearings, gears, couplings, loads, material)
+    return refused(section.key, Shaft, section.name, sections, bearings, gears, couplings, loads, material)
 
 
 def _gear(section: MountedGearSection, pair: GearPair, materials: Materials, of_shaft: Material) -> MountedGear:
-    key = section.at
+    key = section.key
     if section.name in _OWN:
         if section.gear is not None:
             raise DesignFileError(f"{key}.gear", f"has no effect, [{section.name}] is the {section.name}")
@@ -257,27 +257,27 @@ def _differ(one: Material, other: Material) -> bool:
 
 
 def _mesh(section: MeshSection, pair: GearPair) -> GearMesh:
-    numbers = {name: value for name, value in section.given().items() if name in ("angle", *_OF_PAIR)}
+    numbers = {name: value for name, value in section.fields.items() if name in ("angle", *_OF_PAIR)}
     if (section.pinion, section.wheel) == _OWN:
         for name in _OF_PAIR:
             if name in numbers:
-                raise DesignFileError(f"{section.at}.{name}", f"has no effect, pair.{name} is that of the pair")
+                raise DesignFileError(f"{section.key}.{name}", f"has no effect, pair.{name} is that of the pair")
             numbers[name] = getattr(pair, name)
     if section.misalignment is not None:
-        numbers["misalignment"] = built(section.misalignment)
-    return refused(section.at, GearMesh, section.pinion, section.wheel, **numbers)
+        numbers["misalignment"] = section.misalignment.build({})
+    return refused(section.key, GearMesh, section.pinion, section.wheel, **numbers)
 
 
 # By their headings in the reference.
 TABLES: Mapping[str, type[FileTable]] = {
     "[[shafts]]": ShaftSection,
-    "[[shafts.sections]]": _PART,
-    "[[shafts.bearings]]": _BEARING,
-    "[[shafts.bearings]] with stiffness": _MATRIX_BEARING,
+    "[[shafts.sections]]": section_of(ShaftPart, open=False),
+    "[[shafts.bearings]]": section_of(Bearing, open=False),
+    "[[shafts.bearings]] with stiffness": section_of(MatrixBearing, open=False),
     "[[shafts.gears]]": MountedGearSection,
-    "[[shafts.couplings]]": _COUPLING,
-    "[[shafts.loads]]": _LOAD,
+    "[[shafts.couplings]]": section_of(Coupling, open=False),
+    "[[shafts.loads]]": section_of(ShaftLoad, open=False),
     "[[meshes]]": MeshSection,
-    "[meshes.misalignment]": _MISALIGNMENT,
+    "[meshes.misalignment]": section_of(Misalignment, open=False),
     "[housing]": HousingSection,
 }

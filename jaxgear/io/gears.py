@@ -13,7 +13,7 @@ from ..numerics import real as real_number
 from .errors import DesignFileError, suggestion
 from .flanks import FlankFileSection, flank_part
 from .imperial import NORMAL_PITCH, PITCH
-from .table_keys import FileTable, as_field, decode, described, entry, part_of, section_of
+from .table_keys import FileTable, as_field, decode, entry, nested, part_of, section_of
 from .template import Free, Part
 from .value_types import QUALITY_CLASS, Kind, either, list_of, not_of_kind, real, table, text
 
@@ -35,7 +35,7 @@ _ProfileKeys = section_of(ToothProfile)
 _GearKeys = section_of(Gear, ("material", "tooth_thickness_allowance"))
 
 _BACKLASH = Number("um", low=0.0)
-MATERIAL = either(text(), described(Material), "the name of a material, or a table")
+MATERIAL = either(text(), nested(Material), "the name of a material, or a table")
 Materials = Mapping[str, Part]
 
 
@@ -43,7 +43,7 @@ def _modification(key: str, value: Any) -> Part | FlankFileSection:
     given = table().read(key, value)
     if given.get("type") == "file":
         return decode(key, {name: item for name, item in given.items() if name != "type"}, FlankFileSection)
-    return described(AbstractModification).read(key, given)
+    return nested(AbstractModification).read(key, given)
 
 
 class GearSection(_ProfileKeys, _ThicknessKeys, _GearKeys):  # type: ignore[misc, valid-type]
@@ -113,7 +113,7 @@ def drawing_of(section: GearSection) -> dict[str, Any]:
 
     Limits are a list of the lower and the upper one.
     """
-    given, units = section.given(), fields_of(ToothThickness)
+    given, units = section.fields, fields_of(ToothThickness)
     found: dict[str, Any] = {} if isinstance(section.material, Part) else {"material": section.material or _STEEL}
     for name in units:
         if name in given and not isinstance(given[name], Free):
@@ -126,15 +126,15 @@ def check_pitches(*sections: GearSection) -> None:
     for section in sections:
         if section.written.get("module") == PITCH and any(each.helix_angle for each in sections):
             problem = f"may be that of the transverse section: give {NORMAL_PITCH}, which is it / cos(helix_angle)"
-            raise DesignFileError(f"{section.at}.{PITCH}", problem)
+            raise DesignFileError(f"{section.key}.{PITCH}", problem)
 
 
 def fixed_gear(section: GearSection, materials: Materials) -> Gear:
     """A gear of numbers, whose flanks do not count."""
     check_pitches(section)
     for name in _WITHOUT_FLANKS:
-        if name in section.given():
-            raise DesignFileError(f"{section.at}.{name}", "has no effect, only pinion and wheel have flanks")
+        if name in section.fields:
+            raise DesignFileError(f"{section.key}.{name}", "has no effect, only pinion and wheel have flanks")
     return _fixed(gear_part(section, materials))
 
 
@@ -143,7 +143,7 @@ def gear_part(section: GearSection, materials: Materials) -> Part:
     gear = part_of(section, Gear, without=("material",))
     drawn = {**part_of(section, ToothThickness).fields, **part_of(section, ToothProfile).fields}
     if section.material is not None:
-        gear = gear.having(material=_material(f"{section.at}.material", section.material, materials))
+        gear = gear.having(material=_material(f"{section.key}.material", section.material, materials))
     # without any measure of a drawing the gear is the library's: messages then name its own fields
     return replace(gear.having(**drawn), make=drawn_gear if drawn else Gear)
 
@@ -160,7 +160,7 @@ def _material(key: str, given: str | Part, materials: Materials) -> Part:
 
 def fixed_material(section: FileTable, given: str | Part | None, materials: Materials) -> Material:
     """A material of numbers, of a table with such a key, by its name or described; steel for None."""
-    return _fixed(_material(f"{section.at}.material", _STEEL if given is None else given, materials))
+    return _fixed(_material(f"{section.key}.material", _STEEL if given is None else given, materials))
 
 
 def _fixed(part: Part) -> Any:
@@ -173,7 +173,7 @@ def pair_of(section: PairSection, pinion: Part, wheel: Part) -> Part:
     """The pair of two gears, with what its table says."""
     _check_alike(pinion, wheel)
     gears = _of_opposite_hands({"pinion": pinion, "wheel": wheel})
-    pair = Part(GearPair, gears, section.at).having(**part_of(section, GearPair).fields)
+    pair = Part(GearPair, gears, section.key).having(**part_of(section, GearPair).fields)
     if section.backlash is None:
         return pair
     open_gears = [name for name in ("pinion", "wheel") if not set(pair.fields[name].fields) & set(_THICKNESS)]
@@ -245,7 +245,7 @@ def quality_of(pinion: GearSection, wheel: GearSection) -> list[int] | None:
 
 def with_quality(section: Any, own: list[int] | None) -> Any:
     """A table that needs classes: with its own, or with those of the gears."""
-    key = f"{section.at}.quality_class"
+    key = f"{section.key}.quality_class"
     if section.quality_class is None:
         if own is None:
             raise DesignFileError(key, "missing, this key is required where the gears have none")

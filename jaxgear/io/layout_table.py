@@ -1,33 +1,26 @@
 """Table [layout] of a design file: settings of the flank line and profile layout."""
 
-import dataclasses
 from collections.abc import Mapping
-from typing import Any
-
-import numpy as np
+from pathlib import Path
+from typing import Any, Self
 
 from ..conditions import LoadSpectrum
-from ..layout import (
-    FlankLineTolerance,
-    flank_line_tolerance,
-    helix_slope_limits,
-    without_housing,
-)
-from ..metrics import Strength
+from ..layout import FlankLineTolerance, flank_line_tolerance, helix_slope_limits
 from ..numerics import Number
-from ..shafts import Misalignment, ShaftSupport
+from ..shafts import Misalignment
 from .design_file import DesignFile
-from .errors import DesignFileError, naming, refused
-from .gears import both_classes, with_quality
-from .table_keys import FileTable, built, entry, nested, section_of
-from .tables import FurtherTable, Rest
+from .errors import DesignFileError, refused
+from .gears import both_classes
+from .table_keys import FileTable, entry, nested
+from .tables import FurtherTable
+from .template import Part
 from .value_types import QUALITY_CLASSES, choice, count, either, list_of, positive, real, switch
 
 _AMOUNTS = list_of(real(Number("um", low=0.0)))
 _FURTHER = list_of(real(Number("um")))
 _LENGTHS = either(positive("mm"), list_of(positive("mm")), "a number or a list of numbers")
 _HOURS = list_of(real(Number("h", low=0.0)))
-_AXES = either(choice("class"), nested(section_of(Misalignment, open=False)), '"class" or a table')
+_AXES = either(choice("class"), nested(Misalignment, open=False), '"class" or a table')
 
 
 class ProfileSection(FileTable):
@@ -57,6 +50,31 @@ class ProfileSection(FileTable):
     torque_factor: float = entry(positive(""), 0.9)
     shafts: bool = entry(switch(), True)
 
+    def variants(self, most: int | None = None) -> Self:
+        """The table with all lists of numbers that are tried.
+
+        Args:
+            most: length of a list, of which every so many-th number is kept then; None for all.
+
+        Raises:
+            DesignFileError: for a number that is given twice, and lengths of a crowning.
+        """
+        if self.type == "profile_crowning":
+            self.refuse(["length"], ' with type = "profile_crowning"')
+        amounts = {
+            "pinion_amounts": self.pinion_amounts,
+            "wheel_amounts": self.wheel_amounts or self.pinion_amounts,
+            "slopes": self.slopes or [0.0],
+            "crownings": self.crownings or [0.0],
+        }
+        if isinstance(self.length, list):
+            amounts["length"] = self.length
+        for key, values in amounts.items():
+            if len(set(values)) != len(values):
+                raise DesignFileError(f"layout.profile.{key}", "must all be different")
+        steps = {key: -(-len(values) // (most or len(values))) for key, values in amounts.items()}
+        return self.changed(**{key: values[:: steps[key]] for key, values in amounts.items()})
+
 
 class LayoutSection(FurtherTable):
     """Layout of flank lines and profile modifications by `jaxgear layout`.
@@ -85,7 +103,7 @@ class LayoutSection(FurtherTable):
     table = "layout"
 
     quality_class: int | list[int] | None = entry(QUALITY_CLASSES)
-    misalignment: str | FileTable | None = entry(_AXES)
+    misalignment: str | Part | None = entry(_AXES)
     gear: str = entry(choice("pinion", "wheel"), "wheel")
     direction: str = entry(choice("counterclockwise", "clockwise"), "counterclockwise")
     further_crowning: str = entry(choice("rule", "least"), "rule")
@@ -98,18 +116,59 @@ class LayoutSection(FurtherTable):
     profile: ProfileSection | None = entry(nested(ProfileSection))
 
     @classmethod
-    def read(cls, given: Mapping[str, Any], rest: Rest) -> object:
-        """The table, with the quality classes of the gears where it has none of its own."""
+    def read(cls, given: Mapping[str, Any], folder: Path) -> Self:
+        """The table, see `FurtherTable.read`."""
         if "bearing_span" in given:
             instead = 'misalignment = "class", or misalignment = { skew = ..., inclination = ..., bearing_span = ... }'
             raise DesignFileError("layout.bearing_span", f"has no effect without skew or inclination: write {instead}")
-        return with_quality(super().read(given, rest), rest.quality_classes)
+        return super().read(given, folder)
 
     def check(self, design: DesignFile) -> None:
-        """As a layout does, but for what it finds itself."""
+        """Refuses axes, a duty cycle or profile modifications that do not go together."""
         _axes(self.misalignment, float(design.pair().face_width))
-        _life(self, design.tables.get("strength"))
-        _profile(self, quick=False)
+        self.duty_cycle(design)
+        if self.profile is not None:
+            self.profile.variants()
+
+    def tolerances(self, design: DesignFile) -> dict[str, FlankLineTolerance]:
+        """Tolerances of the flank lines by the kind of their sum."""
+        pair, classes = design.pair(), both_classes(self.quality_class)
+        axes = _axes(self.misalignment, float(pair.face_width))
+        return {
+            kind: refused("layout.quality_class", flank_line_tolerance, pair, classes, axes, kind=kind)
+            for kind in ("statistical", "maximum")
+        }
+
+    def duty_cycle(self, design: DesignFile) -> LoadSpectrum | None:
+        """Torques, hours and speeds, for which the file has S-N curves; None without torques."""
+        if self.torques is None:
+            self.refuse(["hours", "speeds"], " without layout.torques")
+            return None
+        for key, numbers in (("hours", self.hours), ("speeds", self.speeds)):
+            if numbers is None:
+                raise DesignFileError(f"layout.{key}", "missing, layout.torques needs it")
+        strength = design.tables.get("strength")
+        for key in ("pitting_cycles", "bending_cycles"):  # given together with stress and exponent
+            if strength is None or getattr(strength, key) is None:
+                raise DesignFileError(f"strength.{key}", "missing, layout.torques needs it")
+        for key, numbers in (("hours", self.hours), ("speeds", self.speeds)):
+            if numbers is not None and len(numbers) != len(self.torques):
+                problem = f"{len(numbers)} numbers must be as many as the {len(self.torques)} torques"
+                raise DesignFileError(f"layout.{key}", problem)
+        return refused("layout.torques", LoadSpectrum.from_hours, self.torques, self.hours, self.speeds)
+
+    def options(self, design: DesignFile) -> dict[str, Any]:
+        """Keyword arguments of `layout_flank_lines`."""
+        load = self.duty_cycle(design)
+        limits = helix_slope_limits(design.pair(), both_classes(self.quality_class))
+        return {
+            "gear": self.gear,
+            "further": limits if self.further_crowning == "rule" else None,
+            "share": self.edge_share,
+            "negative_crowning": self.negative_crowning,
+            "stations": self.stations,
+            **({} if load is None else {"duty_cycle": load, "strength": design.tables["strength"]}),
+        }
 
     @classmethod
     def inner(cls) -> dict[str, type[FileTable]]:
@@ -117,85 +176,11 @@ class LayoutSection(FurtherTable):
         return {"[layout.profile]": ProfileSection}
 
 
-_QUICK_STATIONS, _QUICK_AMOUNTS = 21, 3
-_TORQUES, _QUICK_TORQUES = 25, 7  # over the range of the file
-
-
-@dataclasses.dataclass(frozen=True)
-class LayoutRequest:
-    """A layout of flank lines and profiles, checked.
-
-    Attributes:
-        supports: the mesh on its shafts, in the housing first where there is one, then on rigid seats.
-        tolerances: by name.
-        options: of `layout_flank_lines`.
-        torques: on the pinion, at which K_Hbeta is computed: the range of the file, and those of the duty cycle [N m].
-        profile: what step 3 tries; None for no step 3.
-        profile_torque: on the pinion, of step 3 [N m].
-    """
-
-    supports: dict[str, ShaftSupport]
-    tolerances: dict[str, FlankLineTolerance]
-    options: dict[str, Any]
-    torques: np.ndarray
-    profile: ProfileSection | None
-    profile_torque: float
-
-
-def layout_request(design: DesignFile, *, quick: bool = False) -> LayoutRequest:
-    """Checks what a design file says about a layout.
-
-    Args:
-        design: the design file.
-        quick: fewer stations and profile modifications, for a first look.
-
-    Raises:
-        DesignFileError: for anything that is wrong with it, in one line that names the file and the key.
-    """
-    with naming(design.path):
-        section = design.needed("layout", "it says for which tolerances the flank lines are designed")
-        support = design.support
-        assert support is not None  # every file with the table has one
-        _check_open(design)
-        pair = support.pair
-        classes = both_classes(section.quality_class)
-        axes = _axes(section.misalignment, float(pair.face_width))
-        tolerances = {
-            kind: refused("layout.quality_class", flank_line_tolerance, pair, classes, axes, kind=kind)
-            for kind in ("statistical", "maximum")
-        }
-        further = helix_slope_limits(pair, classes) if section.further_crowning == "rule" else None
-        options = {
-            "gear": section.gear,
-            "further": further,
-            "share": section.edge_share,
-            "negative_crowning": section.negative_crowning,
-            "stations": min(section.stations, _QUICK_STATIONS) if quick else section.stations,
-            **_life(section, design.tables.get("strength")),
-        }
-        housed = support.gearbox.housing is not None
-        supports = {"housing": support, "rigid seats": without_housing(support)} if housed else {"rigid seats": support}
-        profile = _profile(section, quick)
-        range_of_file = np.linspace(*design.torque_range, _QUICK_TORQUES if quick else _TORQUES)
-        torques = np.union1d(range_of_file, section.torques or [])
-        torque = design.torque if profile is None else profile.torque_factor * design.torque
-        return LayoutRequest(supports, tolerances, options, torques, profile, torque)
-
-
-def _check_open(design: DesignFile) -> None:
-    """Refuses what a layout finds itself."""
-    if design.bounds:
-        raise DesignFileError("variables", f"layout needs numbers, these are free: {', '.join(design.bounds)}")
-    for gear, parts in (("pinion", design.design.pinion), ("wheel", design.design.wheel)):
-        if parts:
-            raise DesignFileError(f"{gear}.modification", "layout finds the modifications, leave them out")
-
-
-def _axes(section: str | FileTable | None, width: float):
+def _axes(section: str | Part | None, width: float):
     """Limits of the axes, as `flank_line_tolerance` takes them."""
-    if not isinstance(section, FileTable):
+    if not isinstance(section, Part):
         return section
-    key, amounts = section.at, section.given()
+    key, amounts = section.key, {name: float(value) for name, value in section.fields.items()}
     span = amounts.pop("bearing_span", None)
     for name, value in amounts.items():
         if value < 0:
@@ -206,46 +191,4 @@ def _axes(section: str | FileTable | None, width: float):
         raise DesignFileError(f"{key}.bearing_span", f"{span:g} mm must be at least {width:g} mm, the face width")
     if not amounts:
         raise DesignFileError(key, "must have skew or inclination over a bearing_span, or direct")
-    return built(section)
-
-
-def _life(section: LayoutSection, strength: Strength | None) -> dict[str, Any]:
-    """Duty cycle and strength."""
-    keys = ["hours", "speeds"]
-    if section.torques is None:
-        section.refuse(keys, " without layout.torques")
-        return {}
-    for key in keys:
-        if getattr(section, key) is None:
-            raise DesignFileError(f"layout.{key}", "missing, layout.torques needs it")
-    for key in ("pitting_cycles", "bending_cycles"):  # given together with stress and exponent
-        if strength is None or getattr(strength, key) is None:
-            raise DesignFileError(f"strength.{key}", "missing, layout.torques needs it")
-    for key in keys:
-        count, wanted = len(getattr(section, key)), len(section.torques)
-        if count != wanted:
-            raise DesignFileError(f"layout.{key}", f"{count} numbers must be as many as the {wanted} torques")
-    load = refused("layout.torques", LoadSpectrum.from_hours, section.torques, section.hours, section.speeds)
-    return {"duty_cycle": load, "strength": strength}
-
-
-def _profile(layout: LayoutSection, quick: bool) -> ProfileSection | None:
-    section = layout.profile
-    if section is None:
-        return None
-    if section.type == "profile_crowning":
-        section.refuse(["length"], ' with type = "profile_crowning"')
-    amounts = {
-        "pinion_amounts": section.pinion_amounts,
-        "wheel_amounts": section.wheel_amounts or section.pinion_amounts,
-        "slopes": section.slopes or [0.0],
-        "crownings": section.crownings or [0.0],
-    }
-    if isinstance(section.length, list):
-        amounts["length"] = section.length
-    for key, values in amounts.items():
-        if len(set(values)) != len(values):
-            raise DesignFileError(f"layout.profile.{key}", "must all be different")
-    if quick:
-        amounts = {key: values[:: -(-len(values) // _QUICK_AMOUNTS)] for key, values in amounts.items()}
-    return section.changed(**amounts)
+    return section.build({})

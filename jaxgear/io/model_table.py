@@ -51,7 +51,7 @@ def resolution_of(section: FileTable, uneven: list[str], *, bent: bool, longest:
     Raises:
         DesignFileError: for one slice where modifications vary along the face, or of helical gears.
     """
-    sizes = section.given()
+    sizes = dict(section.fields)
     if sizes.get("slice_widths") is not None:
         sizes.setdefault("slices", len(sizes["slice_widths"]))
     usual = max(_SLICES, helical_slices(longest))
@@ -83,14 +83,14 @@ _FREE = {
 def model_part(section: ModelSection) -> template.Part:
     """The model as far as it needs no gears: all of it, or the plane of what `finite_elements` makes."""
     if section.structure == FINITE_ELEMENTS:
-        others = set(section.given()) - {"structure", "plane", *_TABLES}
+        others = set(section.fields) - {"structure", "plane", *_TABLES}
         if others:
             raise DesignFileError(f"model.{min(others)}", f'cannot be combined with structure = "{FINITE_ELEMENTS}"')
         return template.Part(Compliance, {}, "model")
     section.refuse(_TABLES, f' without structure = "{FINITE_ELEMENTS}"')
     if section.preset == "default":
         return part_of(section, Compliance)
-    given = set(section.given()) - {"preset", "structure"}
+    given = set(section.fields) - {"preset", "structure"}
     if given:
         raise DesignFileError(f"model.{min(given)}", 'cannot be combined with preset = "legacy"')
     return template.Part(legacy_compliance, {}, "model")

@@ -2,8 +2,9 @@
 
 import dataclasses
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import Any, Self
 
+from ..compliance import TabulatedCompliance
 from ..contact import Mesh
 from ..metrics import Quantity
 from ..numerics import AbstractMeasure, Callback, CVaR, Mean, Number, Quantile, Worst
@@ -28,13 +29,14 @@ from .design_file import DesignFile
 from .errors import DesignFileError, check_known, naming, refused, suggestion
 from .model_table import FINITE_ELEMENTS
 from .named_quantities import quantity_named
-from .table_keys import FileTable, Key, entry, nested, section_of
-from .tables import FurtherTable, Rest
+from .table_keys import FileTable, entry, nested, section_of
+from .tables import FurtherTable
 from .tolerance_table import tolerance_of
 from .value_types import (
     LEVEL,
     SEED,
     WEIGHTS,
+    Kind,
     choice,
     count,
     either,
@@ -77,45 +79,37 @@ class FactorialOptions(FileTable):
     )
 
 
-class IterationOptions(FileTable):
+_ITERATION = section_of(METHODS["te_iteration"], ("search",), most=(("steps", 1000),), open=False)
+_FREE_FORM = section_of(METHODS["free_form"], most=(("points", 500), ("steps", 10_000)), open=False)
+
+
+class _Projected(FileTable):
+    """Options of a method without variables.
+
+    Attributes:
+        curve: name of the curve that the flanks are projected on, such as "power"; "cubic" without it.
+    """
+
+    curve: str | None = entry(text())
+
+
+class IterationOptions(_Projected, _ITERATION):  # type: ignore[misc, valid-type]
     """Levels the transmission error by removing it from the flanks.
 
     Attributes:
         start: flanks of the first step: involutes ("unmodified"), the modifications of the file ("given"), or a relief
             designed for the lowest pressure ("low_pressure").
-        curve: name of the curve that the flanks are projected on, such as "power"; "cubic" without it.
     """
 
-    source = METHODS["te_iteration"]
 
-    start: str = entry(choice("unmodified", "given", "low_pressure"), "unmodified")
-    max_relief: float = entry(positive("um"), 7.0)
-    max_pressure: float | None = entry(positive("MPa"))
-    rtol: float | None = entry(positive(""))
-    steps: int | None = entry(count(1, 1000))
-    curve: str | None = entry(text())
-
-
-class FreeFormOptions(FileTable):
-    """Finds the flanks with the least PPTE, of any form, by sequential linear programming.
-
-    Attributes:
-        curve: name of the curve that the flanks are projected on, such as "power"; "cubic" without it.
-    """
-
-    source = METHODS["free_form"]
-
-    points: int | None = entry(count(4, 500))
-    max_relief: float | None = entry(positive("um"))
-    curvature: float | None = entry(real(Number(low=0.0)))
-    steps: int | None = entry(count(1, 10_000))
-    curve: str | None = entry(text())
+class FreeFormOptions(_Projected, _FREE_FORM):  # type: ignore[misc, valid-type]
+    """Finds the flanks with the least PPTE, of any form, by sequential linear programming."""
 
 
 def method_options() -> dict[str, type[FileTable]]:
     """The tables [optimize.<method>] of the methods that have one, of a user's own too: the fields of their classes."""
-    shared, others = ("starts", "steps", "seed"), METHODS_WITHOUT_VARIABLES
-    found = {name: section_of(cls, shared, open=False) for name, cls in METHODS.items() if name not in others}
+    shared = "starts", "steps", "seed"
+    found = {name: section_of(cls, shared, open=False) for name, cls in METHODS.items() if cls.takes_variables}
     found |= {"factorial": FactorialOptions, PARETO: section_of(Pareto)}
     found |= {"te_iteration": IterationOptions, "free_form": FreeFormOptions}
     return {name: section for name, section in found.items() if section.keys}
@@ -174,26 +168,24 @@ class OptimizeSection(FurtherTable):
     constraint: list[ConstraintSection] = entry(list_of(nested(ConstraintSection), empty=True), [])
 
     @classmethod
-    def now(cls) -> "type[OptimizeSection]":
-        """With the options of the methods that are known by now."""
+    def every_key(cls) -> dict[str, Kind]:
+        """Keys of the table, with the options of the methods that are known by now."""
         options = method_options().items()
-        keys = {name: Key(nested(section), meaning="options of the method.") for name, section in options}
-        return type(cls.__name__, (OptimizeSection,), {**keys, "__doc__": OptimizeSection.__doc__, "made": True})
-
-    def check_beside(self, rest: Rest) -> None:
-        """Refuses a search without variables, one by manufactured gears without tolerances, and a needless check."""
-        if not rest.bounds and self.method not in METHODS_WITHOUT_VARIABLES:
-            raise DesignFileError("optimize", "has no effect without [variables]")
-        if self.verify and rest.model.structure == FINITE_ELEMENTS:
-            raise DesignFileError("optimize.verify", f'has no effect with model.structure = "{FINITE_ELEMENTS}"')
-        if self.manufactured is not None and "tolerance" not in rest.names:
-            raise DesignFileError("optimize.manufactured", "needs the table [tolerance]")
+        return cls.keys | {
+            name: dataclasses.replace(nested(section), meaning="options of the method.") for name, section in options
+        }
 
     def check(self, design: DesignFile) -> None:
         """As a search does, whatever method the command line asks for."""
-        _check_method(self.method or _DEFAULT_METHOD)
+        if not design.bounds and self.method not in METHODS_WITHOUT_VARIABLES:
+            raise DesignFileError("optimize", "has no effect without [variables]")
+        if self.verify and isinstance(design.compliance, TabulatedCompliance):
+            raise DesignFileError("optimize.verify", f'has no effect with model.structure = "{FINITE_ELEMENTS}"')
+        if self.manufactured is not None and "tolerance" not in design.tables:
+            raise DesignFileError("optimize.manufactured", "needs the table [tolerance]")
+        check_known("optimize.method", self.method or _DEFAULT_METHOD, known_methods())
         for name in method_options():
-            if self.given().get(name) is not None:
+            if self.fields.get(name) is not None:
                 _check_options(design, name, self.options(name))
         _objectives(design, self)
         _measure(self)
@@ -218,9 +210,9 @@ def optimize_of(design: DesignFile) -> OptimizeSection:
     return design.tables.get("optimize") or OptimizeSection("optimize")
 
 
-def _check_method(name: str) -> None:
-    """Refuses a name that is no method."""
-    check_known("optimize.method", name, (*METHODS, PARETO))
+def known_methods() -> tuple[str, ...]:
+    """Names of all methods."""
+    return (*METHODS, PARETO)
 
 
 def _varies(name: str) -> bool:
@@ -284,97 +276,103 @@ _LASTING, _OVER_LIFE = "mean_ppte_over_life", {"starts": 4, "rounds": 1, "steps"
 
 
 @dataclasses.dataclass(frozen=True)
-class OptimizeRequest:
-    """An optimization, checked; call it to run it.
+class Search:
+    """The search that a design file asks for; call it to run it.
 
     Attributes:
+        design: the design file.
         method: its name.
+        problem: arguments of `Problem` besides the mesh.
+        options: arguments of `minimize` or `pareto` besides problem and callback.
         curve: named curve on which the flanks of a method without parameters are projected; None for the others.
-        verify: whether the designs are to be evaluated with the finite-element structure too; None where that goes.
+        verify: True if the designs are to be evaluated with the finite-element structure too; None where the gears can
+            be meshed.
     """
 
+    design: DesignFile
     method: str
-    curve: str | None
-    verify: bool | None
-    _design: DesignFile
-    _problem: dict[str, Any]  # arguments of `Problem` besides the mesh
-    _search: dict[str, Any]  # arguments of `minimize` or `pareto` besides the callback
+    problem: Mapping[str, Any]
+    options: Mapping[str, Any]
+    curve: str | None = None
+    verify: bool | None = None
+
+    @classmethod
+    def of(cls, design: DesignFile, *, method: str | None = None, quick: bool = False) -> Self:
+        """The search, checked.
+
+        Args:
+            design: the design file.
+            method: method in place of that of the file.
+            quick: few starts, steps and designs, for a first look.
+
+        Raises:
+            DesignFileError: for anything that is wrong with it, in one line that names the file and the key.
+        """
+        section = optimize_of(design)
+        name = method or section.method or _DEFAULT_METHOD
+        with naming(design.path):
+            arguments = _arguments(design, section, name, of_the_file=method is None, quick=quick)
+        return cls(design, name, *arguments, False if quick else section.verify)
 
     @property
     def finer(self) -> int | None:
         """Positions of the finer mesh on which it ends; None where it stays on its mesh or chooses later."""
         ends_on_finer = _varies(self.method) or self.method == PARETO
-        return self._search.get("positions", POSITIONS) if ends_on_finer else None
+        return self.options.get("positions", POSITIONS) if ends_on_finer else None
 
-    def over_life(self, settings: Wear) -> "OptimizeRequest | None":
+    def over_life(self, settings: Wear) -> "Search | None":
         """The search of the same variables for the least mean PPTE over the life at the design torque.
 
         One gradient search without rounding, since every step of it wears a life. None where flanks are sought without
         variables, and where the file asks for a quantity of worn flanks itself.
         """
-        asked = self._problem.get("objective", "ppte")
+        asked = self.problem.get("objective", "ppte")
         if not _varies(self.method) or (isinstance(asked, Quantity) and asked.name in WEAR_QUANTITIES):
             return None
-        kept = {name: self._problem[name] for name in ("design", "bounds", "constraints")}
-        kept |= {"torque": self._design.spectrum(OptimizeSection("optimize"))}
+        kept = {name: self.problem[name] for name in ("design", "bounds", "constraints")}
+        kept |= {"torque": self.design.spectrum(OptimizeSection("optimize"))}
         kept |= {"objective": settings.quantity(_LASTING)}
-        search = {"method": METHODS[_DEFAULT_METHOD](**_OVER_LIFE), "positions": None}
-        return dataclasses.replace(self, method=_DEFAULT_METHOD, _problem=kept, _search=search)
+        options = {"method": METHODS[_DEFAULT_METHOD](**_OVER_LIFE), "positions": None}
+        return dataclasses.replace(self, method=_DEFAULT_METHOD, problem=kept, options=options)
 
     def __call__(self, mesh: Mesh, callback: Callback | None = None) -> Optimum | Front:
         """Runs it on a prepared mesh."""
-        problem = Problem(mesh, **self._problem)
-        if self.method == PARETO:
-            return pareto(problem, callback=callback, **self._search)
-        return minimize(problem, callback=callback, **self._search)
+        search = pareto if self.method == PARETO else minimize
+        return search(Problem(mesh, **self.problem), callback=callback, **self.options)
 
 
-def optimize_request(design: DesignFile, *, method: str | None = None, quick: bool = False) -> OptimizeRequest:
-    """Checks what a design file says about an optimization.
-
-    Args:
-        design: the design file.
-        method: in place of the file's.
-        quick: few starts, steps and designs, for a first look.
-
-    Raises:
-        DesignFileError: for anything that is wrong with it, in one line that names the file and the key.
-    """
-    with naming(design.path):
-        return _request(design, method, quick)
-
-
-def _request(design: DesignFile, method: str | None, quick: bool) -> OptimizeRequest:
-    section = optimize_of(design)
-    name = method or section.method or _DEFAULT_METHOD
+def _arguments(
+    design: DesignFile, section: OptimizeSection, name: str, *, of_the_file: bool, quick: bool
+) -> tuple[dict[str, Any], dict[str, Any], str | None]:
+    """Arguments of the problem and of its search, and the curve of flanks without parameters."""
     flanks_alone = name in METHODS_WITHOUT_VARIABLES
-    _check_method(name)
+    check_known("optimize.method", name, known_methods())
     if not design.bounds and not flanks_alone:
         raise DesignFileError("variables", "missing, nothing to optimize; use jaxgear analyze")
     for free in design.open_case:
         raise DesignFileError(free.key, f'"{free.name}" is a variable, which a sweep alone can vary here')
-    options = _options_of(section, name, of_the_file=method is None)
+    options = _options_of(section, name, of_the_file=of_the_file)
     _check_options(design, name, options)
     curve = options.pop("curve", CURVE) if flanks_alone else None
-    verify = False if quick else section.verify
     problem = {"torque": design.spectrum(section), **_goals(design, section, name, quick)}
     varies = name != "free_form"
     if name == "te_iteration":
-        _check_iteration(design, options["start"], section)
-        if options["start"] == "low_pressure":
+        start = options.get("start")
+        _check_iteration(design, start, section)
+        if start == "low_pressure":
             options["search"] = METHODS[_DEFAULT_METHOD](**(_QUICK[_DEFAULT_METHOD] if quick else {}))
-        varies = options["start"] != "unmodified"
+        varies = start in ("given", "low_pressure")
     if varies:
         problem |= {"design": design.design, "bounds": design.bounds}
     fewer = _QUICK.get(name, {}) if quick else {}
     search: dict[str, Any] = {"method": _made_by(name)(**options | fewer)}
     if _varies(name):
         search["rounding"] = _rounding(design, section)
-    elif method is None:
+    elif of_the_file:
         section.refuse(["rounding"], f' with method "{name}"')
     if quick:  # a quick look stays on its mesh
         search["positions"] = None
-    return OptimizeRequest(name, curve, verify, design, problem, search)
+    return problem, search, curve
 
 
 def _goals(design: DesignFile, section: OptimizeSection, name: str, quick: bool) -> dict[str, Any]:
@@ -387,7 +385,7 @@ def _goals(design: DesignFile, section: OptimizeSection, name: str, quick: bool)
     if section.manufactured is not None:
         pairs = min(section.manufactured, _QUICK_GEARS) if quick else section.manufactured
         tolerance = tolerance_of(design)
-        assert tolerance is not None  # by `check_beside`
+        assert tolerance is not None  # by `check`
         found["manufactured"] = ManufacturedGears(tolerance, pairs, section.seed or 0)
     return found
 
@@ -426,7 +424,7 @@ def _constraints(design: DesignFile, section: OptimizeSection) -> tuple[Constrai
 
 
 def _constraint(design: DesignFile, section: ConstraintSection) -> Constraint:
-    key = section.at
+    key = section.key
     of: Any = section.variables if section.of is None else section.of
     unit = ""
     if of is None or (section.of is not None and section.variables is not None):
@@ -455,13 +453,13 @@ def _rounding(design: DesignFile, section: OptimizeSection) -> dict[str, float]:
     steps: dict[str, float] = {}
     for name, key in ((name, _STEPS[unit]) for name, unit in design.units.items() if unit in _STEPS):
         step = getattr(asked, key)
-        if step and (key in asked.given() or multiples(step, *design.bounds[name])):
+        if step and (key in asked.fields or multiples(step, *design.bounds[name])):
             steps[name] = step
     for name in asked.variables or {}:
         if name not in design.bounds:
             problem = f'"{name}" is not a variable, {suggestion(name, design.bounds)}'
-            raise DesignFileError(f"{asked.at}.variables", problem)
-    return refused(asked.at, check_steps, {**steps, **(asked.variables or {})}, design.bounds)
+            raise DesignFileError(f"{asked.key}.variables", problem)
+    return refused(asked.key, check_steps, {**steps, **(asked.variables or {})}, design.bounds)
 
 
 def _check_reachable(design: DesignFile, key: str, of: str | Quantity, low: float | None) -> None:
@@ -475,7 +473,7 @@ def _check_reachable(design: DesignFile, key: str, of: str | Quantity, low: floa
         raise DesignFileError(key, f"{low:g} must be at most {most}: wear.revolutions = {looked_at:g}")
 
 
-def _check_iteration(design: DesignFile, start: str, section: OptimizeSection) -> None:
+def _check_iteration(design: DesignFile, start: str | None, section: OptimizeSection) -> None:
     """The iteration levels the transmission error at the design torque and knows nothing else."""
     keys = ("measure", "level", "torques", "weights", "manufactured", "constraint")
     section.refuse(keys, ' with method "te_iteration"')

@@ -2,10 +2,10 @@
 
 from ..metrics import Lubricant, Strength
 from ..numerics import Number
+from .design_file import DesignFile
 from .errors import DesignFileError
 from .table_keys import section_of
-from .tables import FILE, Rest, SettingsTable
-from .template import Free
+from .tables import FILE, SettingsTable
 from .value_types import outside
 
 _SPEED = Number("rpm", low=0.0, open_low=True)
@@ -14,16 +14,19 @@ _SPEED = Number("rpm", low=0.0, open_low=True)
 class LubricantSection(SettingsTable, section_of(Lubricant, open=False)):  # type: ignore[misc]
     """The oil, for friction, temperatures, film and scuffing; needs a load.speed greater than 0."""
 
-    def check_beside(self, rest: Rest) -> None:
+    table = "lubricant"
+
+    def check(self, design: DesignFile) -> None:
         """Refuses a lubricant without motion, and its friction beside that of the load."""
-        key, slowest = "load.speed", rest.load.speed
+        key, slowest = "load.speed", design.speed
         if slowest is None:
             raise DesignFileError("lubricant", "has no effect without load.speed")
-        if isinstance(slowest, Free):
-            key, slowest = f"variables.{slowest.name}.low", rest.bounds[slowest.name][0]
+        for free in design.open_case:
+            if free.key == key:
+                key, slowest = f"variables.{free.name}.low", design.bounds[free.name][0]
         if too_slow := outside(_SPEED, slowest):
             raise DesignFileError(key, f"{too_slow} with [lubricant]: no film without motion")
-        if rest.load.friction is not None:
+        if design.friction is not None:
             for name in ("friction", "friction_factor"):
                 if getattr(self, name) is not None:
                     raise DesignFileError(f"lubricant.{name}", "has no effect beside load.friction")
@@ -32,9 +35,11 @@ class LubricantSection(SettingsTable, section_of(Lubricant, open=False)):  # typ
 class StrengthSection(SettingsTable, section_of(Strength, open=False)):  # type: ignore[misc]
     """Permissible stresses, for the safety factors."""
 
-    def check_beside(self, rest: Rest) -> None:
+    table = "strength"
+
+    def check(self, design: DesignFile) -> None:
         """Refuses a table without any stress."""
-        if not self.given().keys() - {FILE}:
+        if not self.fields.keys() - {FILE}:
             raise DesignFileError("strength", "is empty; it gives the permissible stresses")
-        if not self.given().keys() - {FILE, "load_factor"}:
+        if not self.fields.keys() - {FILE, "load_factor"}:
             raise DesignFileError("strength.load_factor", "has no effect without permissible stresses")

@@ -12,7 +12,7 @@ import operator
 import re
 import types
 import typing
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any, ClassVar, Self, TypeVar
 
 import equinox as eqx
@@ -26,24 +26,9 @@ from .trade_words import unknown_key
 from .value_types import Kind, choice, either, list_of, not_of_kind, real, rows_of, switch, table, text
 
 
-@dataclasses.dataclass(frozen=True)
-class Key:
-    """A key of a table.
-
-    Attributes:
-        kind: what may stand after it.
-        default: what holds where the file does not have it; `...` where it must.
-        meaning: for the reference; "" for that in the docstring of the table.
-    """
-
-    kind: Kind
-    default: Any = None
-    meaning: str = ""
-
-
 def entry(kind: Kind, default: Any = None) -> Any:
-    """Declares a key of a table as an attribute of its class, see `Key`."""
-    return Key(kind, default)
+    """Declares a key of a table as an attribute of its class; a default of `...` makes it a required key."""
+    return dataclasses.replace(kind, default=default)
 
 
 class FileTable:
@@ -53,39 +38,44 @@ class FileTable:
         keys: by their names.
         source: class of the library, or function, whose fields they are in part; None for none.
         table: its name where it is one of the top level and its class says so; "" for another.
-        at: its dotted key in the file, "" for the top level.
+        key: its dotted key in the file, "" for the top level.
+        fields: values of the keys that the file sets, in the order of the class.
         written: imperial keys that the file has in place of those of the table, by these.
     """
 
-    keys: ClassVar[dict[str, Key]] = {}
+    keys: ClassVar[dict[str, Kind]] = {}
     source: ClassVar[Any] = None
     table: ClassVar[str] = ""
+    key: str = ""
+    fields: Mapping[str, Any] = {}
+    written: Mapping[str, str] = {}
 
     def __init_subclass__(cls) -> None:
-        own = {name: value for name, value in vars(cls).items() if isinstance(value, Key)}
+        own = {name: value for name, value in vars(cls).items() if isinstance(value, Kind)}
         inherited = [vars(base).get("keys", {}) for base in reversed(cls.__mro__[1:])]
         cls.keys = functools.reduce(operator.or_, [*inherited, own])
 
-    def __init__(self, at: str, /, **given: object) -> None:
-        self.at, self._given = at, given
-        self.written: dict[str, str] = {}
-        for name, allowed in self.keys.items():
+    def __init__(self, key: str, /, **given: object) -> None:
+        keys = self.every_key()
+        self.key, self.fields = key, {name: given[name] for name in keys if name in given}
+        for name, allowed in keys.items():
             if not hasattr(FileTable, name):
                 setattr(self, name, given.get(name, None if allowed.default is ... else allowed.default))
 
-    def given(self) -> dict[str, Any]:
-        """The keys that the file sets."""
-        return {name: self._given[name] for name in self.keys if name in self._given}
+    @classmethod
+    def every_key(cls) -> dict[str, Kind]:
+        """Keys by their names, by default those of the attributes."""
+        return cls.keys
 
     def changed(self, **values: object) -> Self:
         """Copy of the table with other values of some keys, as if the file set them."""
-        return type(self)(self.at, **{**self._given, **values})
+        return type(self)(self.key, **{**self.fields, **values})
 
     def refuse(self, keys: Iterable[str], why: str) -> None:
         """Raises a `DesignFileError` where the file sets any of the keys, which have no effect."""
         for name in keys:
             if getattr(self, name) not in (None, []):
-                raise DesignFileError(join(self.at, name), f"has no effect{why}")
+                raise DesignFileError(join(self.key, name), f"has no effect{why}")
 
 
 S = TypeVar("S", bound=FileTable)
@@ -99,28 +89,58 @@ def decode(key: str, data: object, section: type[S]) -> S:
     """
     if not isinstance(data, dict):
         raise DesignFileError(key, not_of_kind("a table", data))
-    numbers = {name: allowed.kind.number for name, allowed in section.keys.items()}
+    keys = section.every_key()
+    numbers = {name: allowed.number for name, allowed in keys.items()}
     data, written = imperial.metric(key, data, numbers)
-    unknown = next((name for name in data if name not in section.keys), None)
+    unknown = next((name for name in data if name not in keys), None)
     values = {}
-    for name, allowed in section.keys.items():
+    for name, allowed in keys.items():
         if name in data:
-            values[name] = allowed.kind.read(join(key, written.get(name, name)), data[name])
+            values[name] = allowed.read(join(key, written.get(name, name)), data[name])
         elif allowed.default is ... and unknown is None:
             raise DesignFileError(join(key, name), "missing, this key is required")
         elif allowed.default is ...:  # often it is there, misspelt
             break
     if unknown is not None:
-        known = imperial.names(numbers, like=unknown) or section.keys  # a key without the unit is another number
+        known = imperial.names(numbers, like=unknown) or keys  # a key without the unit is another number
         raise DesignFileError(join(key, unknown), unknown_key(unknown, known.keys()))
     made = section(key, **values)
     made.written = written
     return made
 
 
-def nested(section: type[FileTable]) -> Kind:
-    """A table with the keys of a class, within another one."""
-    return Kind("a table", lambda key, value: decode(key, value, section), container=dict)
+def nested(cls: type[Any], *, open: bool = True) -> Kind:
+    """A table with the keys of a class, within another one.
+
+    Of an abstract class its `type` says which class derived from it is meant, or its name alone where that says all.
+
+    Args:
+        cls: class of a table, which is read as an object of it, or of the library, which is read as a `Part`.
+        open: the names of variables may stand for numbers of a class of the library.
+    """
+    if issubclass(cls, FileTable):
+        return Kind("a table", lambda key, value: decode(key, value, cls), container=dict)
+    if not inspect.isabstract(cls):
+        section: type[FileTable] = section_of(cls, open=open)  # type: ignore[arg-type]
+        return Kind("a table", lambda key, value: part_of(decode(key, value, section), cls), container=dict)
+    kind = either(text(empty=True), table(), "the name of a type, or a table")
+    return dataclasses.replace(kind, read=lambda key, value: _of_family(key, kind.read(key, value), cls))
+
+
+def _of_family(key: str, given: dict[str, Any] | str, base: type[eqx.Module]) -> Part:
+    known = family(base)
+    if isinstance(given, str):
+        check_known(key, given, known)
+        given = {"type": given}
+    name = given.get("type")
+    misspelt = difflib.get_close_matches("type", given, n=1)
+    if name is None and misspelt:
+        raise DesignFileError(join(key, misspelt[0]), 'unknown key, did you mean "type"?')
+    if name is None:
+        raise DesignFileError(join(key, "type"), f"missing, must be one of {', '.join(known)}")
+    if not isinstance(name, str) or name not in known:
+        raise DesignFileError(join(key, "type"), not_known(name, known))
+    return nested(known[name]).read(key, {other: value for other, value in given.items() if other != "type"})
 
 
 @functools.cache
@@ -156,44 +176,11 @@ def section_of(
     return type(cls.__name__, (FileTable,), {**keys, **said})
 
 
-def described(cls: type[eqx.Module]) -> Kind:
-    """A table that describes an object of a class of the library, or the name of a type; it is read as a `Part`.
-
-    Of an abstract class its `type` says which class derived from it is meant, or its name alone where that says all.
-    """
-    words = "the name of a type, or a table" if inspect.isabstract(cls) else "a table"
-    kind = either(text(empty=True), table(), words) if inspect.isabstract(cls) else table()
-    return Kind(words, lambda key, value: _parse(key, kind.read(key, value), cls), container=dict)
-
-
-def _parse(key: str, given: dict[str, Any] | str, cls: type[eqx.Module]) -> Part:
-    if inspect.isabstract(cls):
-        known = family(cls)
-        if isinstance(given, str):
-            check_known(key, given, known)
-            given = {"type": given}
-        name = given.get("type")
-        misspelt = difflib.get_close_matches("type", given, n=1)
-        if name is None and misspelt:
-            raise DesignFileError(join(key, misspelt[0]), 'unknown key, did you mean "type"?')
-        if name is None:
-            raise DesignFileError(join(key, "type"), f"missing, must be one of {', '.join(known)}")
-        if not isinstance(name, str) or name not in known:
-            raise DesignFileError(join(key, "type"), not_known(name, known))
-        cls, given = known[name], {other: value for other, value in given.items() if other != "type"}
-    return part_of(decode(key, given, section_of(cls)), cls)
-
-
 def part_of(section: FileTable, cls: type[eqx.Module], *, without: tuple[str, ...] = ()) -> Part:
     """An object of a class from those keys of a table that are its fields, `without` some of them."""
     numbers, names = fields_of(cls), {field.name for field in dataclasses.fields(cls)} - set(without)
-    given = {name: value for name, value in section.given().items() if name in names}
-    return Part(cls, {name: as_field(value, numbers.get(name)) for name, value in given.items()}, section.at)
-
-
-def built(section: FileTable) -> Any:
-    """The object of the library that a table of numbers describes."""
-    return part_of(section, section.source).build({})
+    given = {name: value for name, value in section.fields.items() if name in names}
+    return Part(cls, {name: as_field(value, numbers.get(name)) for name, value in given.items()}, section.key)
 
 
 def as_field(value: Any, number: Number | None) -> Any:
@@ -255,7 +242,7 @@ def _kind(cls, field: dataclasses.Field[Any], most: int | None, open: bool) -> K
     module = _module(hint)
     if module is not None:
         # what contains another of its family is made by the lists of the file
-        return None if inspect.isabstract(module) and issubclass(cls, module) else described(module)
+        return None if inspect.isabstract(module) and issubclass(cls, module) else nested(module)
     if typing.get_origin(hint) is typing.Literal:
         return choice(*typing.get_args(hint))
     plain = {bool: switch(), str: text(), int: real(Number(whole=True)), float: real()}

@@ -8,17 +8,15 @@ derived from `FurtherTable`, or a class of settings derived from `Checked`, of t
 import functools
 import inspect
 import sys
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, ClassVar, Self
+from typing import Any, Self
 
 from ..contact import OperatingPoint
 from ..metrics import Quantity
 from ..numerics import Checked, Number
 from .errors import DesignFileError, join, referring
-from .model_table import ModelSection
-from .table_keys import FileTable, built, decode, descendants, entry, section_of
+from .table_keys import FileTable, decode, descendants, entry, part_of, section_of
 from .template import Free
 from .toml import read
 from .value_types import Kind, list_of, positive, real, text
@@ -54,61 +52,29 @@ class LoadSection(section_of(OperatingPoint)):  # type: ignore[misc]
     torque_range: list[float] | None = entry(list_of(positive("N m"), length=2))
 
 
-@dataclass(frozen=True)
-class Rest:
-    """Rest of a design file, as far as the checks of further tables need it.
-
-    Attributes:
-        folder: folder of the file, to which its paths are relative.
-        names: names of the tables in the file.
-        load: the table [load].
-        model: the table [model].
-        bounds: (low, high) of every free parameter.
-        quality_classes: flank tolerance classes of both gears; None where they have none.
-    """
-
-    folder: Path
-    names: Sequence[str]
-    load: LoadSection
-    model: ModelSection
-    bounds: Mapping[str, tuple[float, float]]
-    quality_classes: list[int] | None
-
-
 class FurtherTable(FileTable):
-    """A table that a file may have besides those of gears, load and model.
-
-    Attributes:
-        made: of another class, which is found in its place.
-    """
-
-    made: ClassVar[bool] = False
+    """A table that a file may have besides those of gears, load and model."""
 
     @classmethod
-    def now(cls) -> type[Self]:
-        """The class with the keys that are known by now; itself where these do not change."""
-        return cls
-
-    @classmethod
-    def read(cls, given: Mapping[str, Any], rest: Rest) -> object:
-        """Object that `DesignFile.tables` holds for the table, by default one of this class.
+    def read(cls, given: Mapping[str, Any], folder: Path) -> Self:
+        """The table as it is in the file.
 
         Args:
-            given: the table as in the file.
-            rest: rest of the file.
+            given: content of the table.
+            folder: folder of the file, to which its paths are relative.
 
         Raises:
             DesignFileError: for anything that is wrong with it, in one line that names the key.
         """
-        section = decode(cls.table, given, cls)
-        section.check_beside(rest)
-        return section
+        return decode(cls.table, given, cls)
 
-    def check_beside(self, rest: Rest) -> None:
-        """Raises a `DesignFileError` where the table does not go together with the rest of the file."""
+    @property
+    def held(self) -> object:
+        """The object that `DesignFile.tables` holds for the table, by default the table itself."""
+        return self
 
     def check(self, design: Any) -> None:
-        """Raises a `DesignFileError` for what is wrong with the table in a design file that is read otherwise."""
+        """Raises a `DesignFileError` where the table does not go together with the rest of a design file."""
 
     def quantity(self, design: Any, key: str, quantity: Quantity) -> Quantity:
         """A quantity of the settings that the table stands for, with them.
@@ -138,16 +104,14 @@ class SettingsTable(FurtherTable):
 
     file: str | None = entry(text())
 
-    @classmethod
-    def read(cls, given: Mapping[str, Any], rest: Rest) -> object:
-        """The settings, see `FurtherTable.read`."""
-        section = cls._whole(given, rest.folder)
-        section.check_beside(rest)
-        return built(section)
+    @property
+    def held(self) -> object:
+        """The settings."""
+        return part_of(self, self.source).build({})
 
     @classmethod
-    def _whole(cls, given: Mapping[str, Any], folder: Path) -> Self:
-        """A table with what stands in its file."""
+    def read(cls, given: Mapping[str, Any], folder: Path) -> Self:
+        """The table with the keys that stand in its file, see `FurtherTable.read`."""
         name = decode(cls.table, {FILE: given[FILE]} if FILE in given else {}, SettingsTable).file
         if name is None:
             return decode(cls.table, given, cls)
@@ -176,7 +140,7 @@ def further_tables(*, users: bool = True) -> dict[str, type[FurtherTable]]:
     found = [cls for base in (Checked, FurtherTable) for cls in descendants(base) if _names_a_table(cls)]
     library = {cls.table: cls for cls in found if cls.__module__.startswith("jaxgear.")}
     own = {cls.table: cls for cls in found if users and cls.table not in library}
-    return {name: _table_of(cls).now() for name, cls in sorted((library | own).items())}
+    return {name: _table_of(cls) for name, cls in sorted((library | own).items())}
 
 
 @functools.cache
@@ -188,9 +152,8 @@ def _import_public() -> None:
 
 
 def _names_a_table(cls: Any) -> bool:
-    """Whether a class is a further table: not by what it is derived from, nor by what it is made of."""
-    own = cls.table if issubclass(cls, FurtherTable) and not cls.made else vars(cls).get("table")
-    return bool(own) and isinstance(own, str) and not inspect.isabstract(cls)
+    """Whether a class is a further table: it says the name itself, whatever it is derived from or made of."""
+    return bool(vars(cls).get("table")) and isinstance(cls.table, str) and not inspect.isabstract(cls)
 
 
 @functools.cache
@@ -198,7 +161,7 @@ def _table_of(cls: Any) -> type[FurtherTable]:
     """The table of a class of settings, which knows nothing of design files, or of one that does."""
     if issubclass(cls, FurtherTable):
         return cls
-    return type(cls.__name__, (SettingsTable, section_of(cls, open=False)), {"__doc__": cls.__doc__, "made": True})
+    return type(cls.__name__, (SettingsTable, section_of(cls, open=False)), {"__doc__": cls.__doc__})
 
 
 class ProjectSection(FurtherTable):

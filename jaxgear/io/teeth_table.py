@@ -20,8 +20,9 @@ from .design_file import DesignFile
 from .errors import DesignFileError, join, naming, referring, refused
 from .flanks import check_flank, flank_of_rows, numbers_of
 from .rows import read_rows
-from .table_keys import FileTable, built, entry, nested, section_of
+from .table_keys import FileTable, entry, nested, section_of
 from .tables import FurtherTable
+from .template import Part
 from .value_types import QUALITY_CLASS, SEED, Kind, choice, count, list_of, positive, real, text
 
 _GEAR, _COUNT = choice("pinion", "wheel", "hunting"), count(1, MOST_WINDOWS)
@@ -62,7 +63,7 @@ class GearTeethSection(FileTable):
     profile_slope: list[float] | None = entry(_AMOUNTS)
     helix_slope: list[float] | None = entry(_AMOUNTS)
     run_out: float | None = entry(positive("um"))
-    undulations: list[FileTable] = entry(list_of(nested(section_of(Undulation, open=False))), [])
+    undulations: list[Part] = entry(list_of(nested(Undulation, open=False)), [])
     file: str | None = entry(text())
     flanks: str | None = entry(text())
     quality_class: int | None = entry(QUALITY_CLASS)
@@ -134,7 +135,7 @@ def _deviations(design: DesignFile, name: str, section: GearTeethSection | None)
     """Deviations of the teeth of one gear; None without its table."""
     if section is None:
         return None
-    at, gear, lists = section.at, getattr(design.pair(), name), _lists(design, section)
+    at, gear, lists = section.key, getattr(design.pair(), name), _lists(design, section)
     teeth = round(float(gear.teeth))
     for key, values in lists.items():
         if len(values) != teeth:
@@ -144,14 +145,14 @@ def _deviations(design: DesignFile, name: str, section: GearTeethSection | None)
     pitch = jnp.asarray(lists.get("pitch", np.zeros(teeth)), float)
     if "single_pitch" in lists:
         pitch = refused(join(at, "single_pitch"), TeethDeviations.from_single_pitch, lists["single_pitch"]).pitch
-    waves = [built(each) for each in section.undulations]
+    waves = [each.build({}) for each in section.undulations]
     if section.run_out is not None:
         waves.append(Undulation(jnp.asarray(0.5 * section.run_out), jnp.asarray(1.0)))
     if section.quality_class is not None:
         draw = partial(TeethDeviations.drawn, key=jax.random.fold_in(jax.random.key(section.seed), name == "wheel"))
         drawn = refused(join(at, "quality_class"), draw, gear, section.quality_class)
         pitch, waves = pitch + drawn.pitch, [*waves, *drawn.undulations]
-    elif "seed" in section.given():
+    elif "seed" in section.fields:
         section.refuse(["seed"], " without quality_class")
     flanks: list[Any] = [jax.vmap(make)(jnp.asarray(lists[key])) for key, make in _SLOPES.items() if key in lists]
     if section.flanks is not None:
@@ -166,13 +167,13 @@ def _lists(design: DesignFile, section: GearTeethSection) -> dict[str, Any]:
     found = {key: getattr(section, key) for key in _LISTS if getattr(section, key) is not None}
     if section.file is None:
         return found
-    with referring(join(section.at, "file"), section.file):
+    with referring(join(section.key, "file"), section.file):
         rows = read_rows(design.path.parent / section.file)
         columns = {key: f"{key}_um" for key in _LISTS if f"{key}_um" in rows[0]}
         if not columns:
             raise DesignFileError("", f"has no column {', '.join(f'{key}_um' for key in _LISTS)}, must have one")
         for twice in columns.keys() & found.keys():
-            raise DesignFileError("", f"has {columns[twice]}, which is given as {join(section.at, twice)} too")
+            raise DesignFileError("", f"has {columns[twice]}, which is given as {join(section.key, twice)} too")
         if _TOOTH in rows[0]:
             numbers = numbers_of(rows, _TOOTH)
             if numbers[0] not in (0, 1) or (np.diff(numbers) != 1).any():
@@ -187,7 +188,7 @@ def _lists(design: DesignFile, section: GearTeethSection) -> dict[str, Any]:
 def _measured(design: DesignFile, name: str, section: GearTeethSection) -> AbstractModification:
     """A flank of every tooth from a file."""
     assert section.flanks is not None
-    pair, key = design.pair(), join(section.at, "flanks")
+    pair, key = design.pair(), join(section.key, "flanks")
     gear = getattr(pair, name)
     with referring(key, section.flanks):
         rows = read_rows(design.path.parent / section.flanks)
@@ -217,4 +218,4 @@ def _check_slices(
         if jax.tree.map(lambda leaf, tooth=tooth: jnp.asarray(leaf)[tooth], flanks).varies_along_face:
             key = "file" if section.helix_slope is None and "helix_slope" in lists else "helix_slope"
             key = key if "helix_slope" in lists else "flanks"
-            raise DesignFileError(join(section.at, key), "needs resolution.slices of at least 2, one cannot show it")
+            raise DesignFileError(join(section.key, key), "needs resolution.slices of at least 2, one cannot show it")

@@ -1,14 +1,10 @@
 """The table [tolerance], and the flank tolerances of the gears of a design file."""
 
-from collections.abc import Mapping
-from typing import Any
-
 from ..tolerance import ManufacturedGears, Tolerance, ToleranceClass
 from .design_file import DesignFile
 from .errors import DesignFileError, problem, refused
-from .gears import with_quality
 from .table_keys import entry, section_of
-from .tables import FurtherTable, Rest
+from .tables import FurtherTable
 from .value_types import QUALITY_CLASSES, SEED, count
 
 _LIMITS = section_of(Tolerance, ("pinion", "wheel", "distribution"), open=False)
@@ -23,14 +19,11 @@ class ToleranceSection(FurtherTable, _LIMITS):  # type: ignore[misc, valid-type]
         seed: of their deviations.
     """
 
+    table = "tolerance"
+
     quality_class: int | list[int] | None = entry(QUALITY_CLASSES)
     samples: int = entry(count(2, 100_000), 64)
     seed: int = entry(SEED, 0)
-
-    @classmethod
-    def read(cls, given: Mapping[str, Any], rest: Rest) -> object:
-        """The table, with the quality classes of the gears where it has none of its own."""
-        return with_quality(super().read(given, rest), rest.quality_classes)
 
 
 def quality_classes(design: DesignFile) -> tuple[ToleranceClass, ToleranceClass] | None:

@@ -85,12 +85,16 @@ class Kind:
         read: function of the key and the raw value that returns the value; raises `DesignFileError` if not allowed.
         number: unit and range of the number or numbers; None for other values.
         container: list or dict; None for a plain value.
+        default: value of a key that the file does not have; `...` for a required key.
+        meaning: meaning of the key for the reference; "" for that in the docstring of its table.
     """
 
     words: str
     read: Callable[[str, Any], Any]
     number: Number | None = None
     container: type | None = None
+    default: Any = None
+    meaning: str = ""
 
 
 def real(limits: Number = Number(), *, open: bool = False, plausible: bool = True) -> Kind:

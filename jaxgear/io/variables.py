@@ -40,10 +40,10 @@ def read_variables(
     """
     units: dict[str, str] = {}
     for variable in variables.values():
-        increasing(f"{variable.at}.high", variable.low, variable.high)
+        increasing(f"{variable.key}.high", variable.low, variable.high)
         if variable.value is not None and not variable.low <= variable.value <= variable.high:
             problem = f"{variable.value:g} must be at least {variable.low:g} and at most {variable.high:g}"
-            raise DesignFileError(f"{variable.at}.value", problem)
+            raise DesignFileError(f"{variable.key}.value", problem)
     bounds = {name: (variable.low, variable.high) for name, variable in variables.items()}
     values = {name: variable.value for name, variable in variables.items() if variable.value is not None}
     for free in open_numbers:
@@ -65,9 +65,9 @@ def read_variables(
         if name not in units:
             where = f"{' and '.join(empty)} = [] has no modification" if empty else "no number of the file has its name"
             problem = f'is declared but used nowhere: {where}, write "{name}" in place of the number that it stands for'
-            raise DesignFileError(variable.at, problem)
+            raise DesignFileError(variable.key, problem)
         if variable.unit is not None and variable.unit != units[name]:
-            raise DesignFileError(f"{variable.at}.unit", f'"{variable.unit}" must be "{units[name]}" as it is used')
+            raise DesignFileError(f"{variable.key}.unit", f'"{variable.unit}" must be "{units[name]}" as it is used')
     return bounds, {name: units[name] for name in bounds}, values
 
 

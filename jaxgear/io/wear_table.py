@@ -6,8 +6,7 @@ from ..conditions import LoadSpectrum
 from ..metrics import Quantity
 from ..wear import Wear
 from .design_file import DesignFile
-from .dynamics_table import dynamics_of
-from .errors import DesignFileError, naming
+from .errors import DesignFileError
 from .table_keys import entry, part_of, section_of
 from .tables import FurtherTable
 from .value_types import WEIGHTS, choice, list_of, positive
@@ -26,15 +25,16 @@ class WearSection(FurtherTable, section_of(Wear, ("dynamics", "loads"), open=Fal
         speeds: of the pinion at every torque; that of the file without it.
     """
 
+    table = "wear"
+
     line_load: str = entry(choice("static", "dynamic"), "static")
-    largest_increment: float | None = entry(positive("um"))
     torques: list[float] | None = entry(list_of(positive("N m")))
     weights: list[float] | None = entry(WEIGHTS)
     speeds: list[float] | None = entry(list_of(positive("rpm")))
 
     def check(self, design: DesignFile) -> None:
-        """As a study of all commands does."""
-        wear_request(design)
+        """Refuses a spectrum, dynamics or a load that do not go together."""
+        self.settings(design)
 
     def quantity(self, design: DesignFile, key: str, quantity: Quantity) -> Quantity:
         """Quantity with the settings of [wear]; needs `blocks`, which are of equal length."""
@@ -43,60 +43,24 @@ class WearSection(FurtherTable, section_of(Wear, ("dynamics", "loads"), open=Fal
                 f'missing, "{quantity.name}" needs it: wear.largest_increment is for the lives of `jaxgear wear` alone'
             )
             raise DesignFileError("wear.blocks", problem)
-        vibrates = quantity.needs == "dynamics" or self.line_load == "dynamic"
-        return quantity.with_settings(wear_of(design, vibrates=vibrates))
+        settings = self.settings(design, vibrates=quantity.needs == "dynamics")
+        return quantity.with_settings(dataclasses.replace(settings, largest_increment=None))
 
+    def settings(self, design: DesignFile, *, vibrates: bool = False) -> Wear:
+        """The settings that the table stands for.
 
-_QUICK_BLOCKS = 4
-
-
-@dataclasses.dataclass(frozen=True)
-class WearRequest:
-    """A study of wear over the life, checked.
-
-    Attributes:
-        settings: revolutions and coefficients.
-        largest_increment: depth that a block wears off [um]; None for blocks of equal length.
-    """
-
-    settings: Wear
-    largest_increment: float | None
-
-
-def wear_request(design: DesignFile, *, quick: bool = False) -> WearRequest:
-    """Checks what a design file says about its wear.
-
-    Args:
-        design: the design file.
-        quick: few blocks, for a first look.
-
-    Raises:
-        DesignFileError: for anything that is wrong with it, in one line that names the file and the key.
-    """
-    with naming(design.path):
-        section = design.needed("wear", "it says for how long the pair runs and how it wears")
-        settings = wear_of(design, vibrates=section.line_load == "dynamic")
-        if quick:
-            return WearRequest(dataclasses.replace(settings, blocks=_QUICK_BLOCKS), None)
-        return WearRequest(settings, section.largest_increment)
-
-
-def wear_of(design: DesignFile, *, vibrates: bool) -> Wear:
-    """The settings of the table [wear], which the file has.
-
-    Args:
-        design: the design file.
-        vibrates: the motion counts; otherwise flanks wear under the static load.
-    """
-    section = design.tables["wear"]
-    part = part_of(section, Wear)
-    if vibrates:
-        speed = design.speed if section.speeds is None else section.speeds
-        for known, name in ((design.tables.get("dynamics"), "the table [dynamics]"), (speed, "load.speed")):
-            if known is None:
-                raise DesignFileError("wear.line_load", f'"dynamic" needs {name}')
-        part = part.having(dynamics=dynamics_of(design), line_load=section.line_load)
-    return dataclasses.replace(part.build({}), loads=_loads(design, section))
+        Args:
+            design: the design file.
+            vibrates: True if the motion counts under a static line load too.
+        """
+        part = part_of(self, Wear)
+        if vibrates or self.line_load == "dynamic":
+            speed = design.speed if self.speeds is None else self.speeds
+            for known, name in ((design.tables.get("dynamics"), "the table [dynamics]"), (speed, "load.speed")):
+                if known is None:
+                    raise DesignFileError("wear.line_load", f'"dynamic" needs {name}')
+            part = part.having(dynamics=design.tables["dynamics"].settings(design), line_load=self.line_load)
+        return dataclasses.replace(part.build({}), loads=_loads(design, self))
 
 
 def _loads(design: DesignFile, section: WearSection) -> LoadSpectrum | None:

@@ -23,56 +23,7 @@ _MOST, _LEAST_MOST = 3.0, 20.0  # largest amount that is searched, relative to t
 # basic rack of ISO 53: degrees, and coefficients of the module
 _PRESSURE_ANGLE, _ADDENDUM, _DEDENDUM = 20.0, 1.0, 1.25
 
-_TEXT = """# {title}
-#
-# jaxgear analyze {name}     shows the pair without modification and with the tip reliefs of the values below
-# jaxgear optimize {name}    finds the best values between low and high
-#
-# python -m jaxgear.io prints every table and key; a misspelt one is refused by name.
-title = "{title}"
-
-[pinion]                        # drives
-teeth = {pinion}
-module = {module!r}
-face_width = {face_width!r}             # mm
-{rack}{hand}{shift}# bore_diameter = 20.0          # mm; half the root diameter where it is not given
-# quality_class = 6             # ISO 1328-1, for the band in the charts
-
-[wheel]
-teeth = {wheel}
-module = {module!r}
-face_width = {face_width!r}
-{rack}{mate_shift}
-# [pair]
-# center_distance = {distance:.3f}     # mm; without backlash where it is not given
-# backlash = 50.0               # um on the line of action, of helical gears normal to the flanks
-
-[load]
-torque = {torque!r}                 # N m on the pinion
-{speed}
-# Numbers that are left open: `value` is what analyze takes, here the rule of ISO 6336-1.
-[variables]
-pinion_amount = {{ low = 0.0, high = {most:.0f}.0, value = {amount:.1f}, unit = "um" }}
-pinion_length = {{ low = {shortest:.2f}, high = {longest:.2f}, value = {length:.2f}, unit = "mm" }}
-wheel_amount = {{ low = 0.0, high = {most:.0f}.0, value = {amount:.1f}, unit = "um" }}
-wheel_length = {{ low = {shortest:.2f}, high = {longest:.2f}, value = {length:.2f}, unit = "mm" }}
-
-[[pinion.modification]]
-type = "tip_relief"
-amount = "pinion_amount"
-length = "pinion_length"        # of roll length, from the tip
-curve = "parabolic"             # or "linear", {{ type = "power", exponent = 1.5 }} ...
-
-[[wheel.modification]]
-type = "tip_relief"
-amount = "wheel_amount"
-length = "wheel_length"
-curve = "parabolic"
-
-# [optimize]
-# objective = "ppte"            # or another quantity, such as "max_flank_pressure"; better small or large by its nature
-# constraint = [{{ of = "max_flank_pressure", high = 1200.0 }}]
-"""
+_STARTER = Path(__file__).with_name("starter.txt")  # with fields to be filled
 _HAND = "helix_angle = {angle!r}   # deg, positive for a right hand; the wheel has the other\n"
 _SPUR = "# helix_angle = 15.0            # deg, positive for a right hand; the wheel has the other\n"
 _RACK = "pressure_angle = {angle!r}         # deg\n"
@@ -130,7 +81,7 @@ def write_starter(
     rack = "" if pressure_angle == _PRESSURE_ANGLE else _RACK.format(angle=pressure_angle)
     rack += _FILLET.format(radius=float(pair.pinion.root_radius)) if pressure_angle < _PRESSURE_ANGLE else ""
     shifts = [_SHIFT.format(shift=shift) if shift else _NO_SHIFT for shift in profile_shift]
-    text = _TEXT.format(
+    text = _STARTER.read_text(encoding="utf-8").format(
         name=path.name,
         title=f"{teeth[0]}/{teeth[1]} pair, module {module:g} mm",
         pinion=teeth[0],

@@ -12,6 +12,7 @@ from unicodedata import category
 import numpy as np
 import rich.table
 from rich.box import SIMPLE_HEAD
+from rich.console import Console, ConsoleOptions
 
 from ..io import writing
 from ..numerics.durable import write_durably
@@ -52,6 +53,9 @@ class Source:
         return cls(path.name, content.decode("utf-8-sig", "replace"), hashlib.sha256(content).hexdigest())
 
 
+_LABEL_WIDTH, _CELL_WIDTH = 32, 10  # of a table whose columns must fit [characters]
+
+
 @dataclass
 class Table:
     """A table of texts, which a terminal prints and a report holds.
@@ -62,6 +66,7 @@ class Table:
         title: over the table.
         note: under the table.
         ends: numbers of the rows that end a group.
+        narrow: True if a terminal shows as many columns as fit.
     """
 
     header: tuple[str, ...]
@@ -69,6 +74,7 @@ class Table:
     title: str = ""
     note: str = ""
     ends: tuple[int, ...] = ()
+    narrow: bool = False
 
     def add_row(self, *cells: str) -> None:
         """Adds a row at the end."""
@@ -78,14 +84,15 @@ class Table:
         """Ends a group of rows."""
         self.ends += (len(self.rows) - 1,)
 
-    def __rich__(self) -> rich.table.Table:
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> Iterator[rich.table.Table]:
+        count = max((options.max_width - _LABEL_WIDTH) // _CELL_WIDTH, 1) if self.narrow else len(self.header)
         shown = rich.table.Table(box=SIMPLE_HEAD, title_justify="left", caption_justify="left")
         shown.title, shown.caption = self.title or None, self.note or None
-        for place, heading in enumerate(self.header):
+        for place, heading in enumerate(self.header[: 1 + count]):
             shown.add_column(heading, justify="right" if place else "left", no_wrap=place > 0)
         for number, row in enumerate(self.rows):
-            shown.add_row(*row, end_section=number in self.ends)
-        return shown
+            shown.add_row(*row[: 1 + count], end_section=number in self.ends)
+        yield shown
 
 
 @dataclass(frozen=True)

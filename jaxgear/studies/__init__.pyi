@@ -1,12 +1,13 @@
 """The public names, for type checkers and for `__init__.py`, which imports each when it is asked for."""
 
+from .analysis import AnalysisStudy as AnalysisStudy
+from .analysis import OptimizationStudy as OptimizationStudy
 from .checkpoints import Checkpoints as Checkpoints
 from .checkpoints import NamedArrays as NamedArrays
 from .comparison import compared as compared
 from .comparison import rule_based as rule_based
 from .comparison import search_of as search_of
 from .comparison_result import ComparisonResult as ComparisonResult
-from .design_analysis import DesignAnalysis as DesignAnalysis
 from .dynamics import DynamicsStudy as DynamicsStudy
 from .dynamics_result import DynamicsResult as DynamicsResult
 from .evaluation import Evaluation as Evaluation
@@ -15,7 +16,6 @@ from .export import ExportResult as ExportResult
 from .export import ExportStudy as ExportStudy
 from .layout import LayoutStudy as LayoutStudy
 from .layout_result import LayoutResult as LayoutResult
-from .optimization import DesignOptimization as DesignOptimization
 from .progress import Progress as Progress
 from .progress import Stages as Stages
 from .results import study_summary as study_summary
@@ -24,6 +24,8 @@ from .revolution import RevolutionResult as RevolutionResult
 from .revolution import RevolutionStudy as RevolutionStudy
 from .study import AbstractStudy as AbstractStudy
 from .study import AbstractStudyResult as AbstractStudyResult
+from .sweep import SweepStudy as SweepStudy
+from .sweep_result import SweepResult as SweepResult
 from .wear import WearStudy as WearStudy
 from .wear_result import WearResult as WearResult
 from .wear_scatter import manufactured_wear as manufactured_wear

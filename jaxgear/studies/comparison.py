@@ -7,7 +7,7 @@ import numpy as np
 
 from ..contact import Mesh, prepare
 from ..geometry import GearPair, PathOfContact, explicit, pair_geometry
-from ..io import DesignFile, OptimizeRequest, optimize_request
+from ..io import DesignFile, Search
 from ..io.optimize_table import METHODS_WITHOUT_VARIABLES, optimize_of
 from ..microgeometry import AbstractModification, NoModification
 from ..numerics import program
@@ -22,10 +22,10 @@ Modifications = tuple[AbstractModification, AbstractModification]
 _POSITIONS, _PAIRS = "positions of the mesh", "pairs of the mesh"  # no names of variables, which have no spaces
 
 
-def search_of(design: DesignFile, *, quick: bool) -> OptimizeRequest | None:
+def search_of(design: DesignFile, *, quick: bool) -> Search | None:
     """The search that the file asks for; None where its modifications are numbers and it names no method."""
     if design.bounds or optimize_of(design).method in METHODS_WITHOUT_VARIABLES:
-        return optimize_request(design, quick=quick)
+        return Search.of(design, quick=quick)
     return None
 
 
@@ -50,7 +50,7 @@ def _iso_relief(pair: GearPair, path: PathOfContact, torque, application_factor)
 def compared(
     design: DesignFile,
     torque: float,
-    search: OptimizeRequest | None = None,
+    search: Search | None = None,
     checkpoints: Checkpoints | None = None,
     stages: Stages | None = None,
     *,
@@ -86,7 +86,7 @@ def compared(
 def sought(
     design: DesignFile,
     name: str,
-    search: OptimizeRequest,
+    search: Search,
     mesh: Mesh,
     checkpoints: Checkpoints,
     stages: Stages,

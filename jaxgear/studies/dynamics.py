@@ -26,7 +26,7 @@ from ..dynamics import (
 )
 from ..dynamics.oscillator import Natural
 from ..dynamics.speed_sweep import STABLE_STEPS
-from ..io import DesignFile, DesignFileError, DynamicsRequest, OptimizeRequest, dynamics_request
+from ..io import DesignFile, DesignFileError, Search
 from ..io.errors import naming
 from .checkpoints import Checkpoints, SpeedResponses
 from .comparison import Modifications, compared, search_of
@@ -34,6 +34,7 @@ from .dynamics_result import DynamicsResult, next_to_design, peak
 from .progress import Stages
 from .study import AbstractStudy
 
+_QUICK_SPEEDS = 24
 _POINTS = 400  # of a branch: through the folds of an unmodified pair it takes about 120
 _SAME = 1e-3  # relative difference of dynamic factors of one orbit, by two integrations
 _BESIDE = 4  # speeds on either side of a peak that are gone through again on a finer grid
@@ -83,7 +84,7 @@ def _grid_change(result: DynamicsResult) -> dict[str, dict[str, float]]:
     """Change of the largest dynamic factor of every design at twice the positions of the mesh force.
 
     The steps of the integrator are doubled too, as they meet no more positions than their number."""
-    settings = result.request.settings
+    settings = result.settings
     finer = replace(settings, positions=2 * settings.positions)
     last = len(settings.mesh_frequencies)
     width = min(2 * _BESIDE + 1, last)
@@ -140,24 +141,32 @@ class DynamicsStudy(AbstractStudy[DynamicsResult]):
     the optimum of its variables. What an interrupted command has found is kept: the same command goes on from there.
 
     Attributes:
-        request: what the file asks for.
+        settings: speeds and vibrating masses.
+        torques: torques on the pinion [N m], ascending.
+        run_up: duration of a run-up [s]; None for no run-up.
         search: for the optimum of the file; None where its modifications are numbers.
     """
 
     name: ClassVar = "dynamics"
     coarse: ClassVar = "coarse positions and few speeds"
 
-    request: DynamicsRequest
-    search: OptimizeRequest | None
+    settings: Dynamics
+    torques: tuple[float, ...]
+    run_up: float | None
+    search: Search | None
 
     @classmethod
     def of(cls, design: DesignFile, *, quick: bool = False) -> Self:
         """Speed study of a design file, see `AbstractStudy.of`."""
-        return cls(design, quick, dynamics_request(design, quick=quick), search_of(design, quick=quick))
+        with naming(design.path):
+            section = design.needed("dynamics", "it says at which speeds the pair runs")
+            settings = section.settings(design, _QUICK_SPEEDS if quick else None)
+            asked = settings, section.torques(design), section.run_up
+        return cls(design, quick, *asked, search_of(design, quick=quick))
 
     def work_out(self, checkpoints: Checkpoints, stages: Stages) -> DynamicsResult:
         """All runs of all designs under all torques, and the branches of one, a quick study its first branch."""
-        highest = max(self.design.torque, *self.request.torques)
+        highest = max(self.design.torque, *self.torques)
         found = compared(self.design, highest, self.search, checkpoints, stages, quick=self.quick)
         result = self._responses(*found, checkpoints, stages)
         if self.quick:
@@ -168,12 +177,12 @@ class DynamicsStudy(AbstractStudy[DynamicsResult]):
     def _responses(
         self, mesh: Mesh, designs: dict[str, Modifications], checkpoints: Checkpoints, stages: Stages
     ) -> DynamicsResult:
-        design, request, settings = self.design, self.request, self.request.settings
+        design, settings = self.design, self.settings
         oscillators: dict[str, dict[float, Oscillator]] = {}
         for name, (pinion, wheel) in designs.items():
             stages.begin(f"mesh force of the {name} design")
             oscillators[name] = {
-                torque: settings.oscillator(mesh, torque, pinion=pinion, wheel=wheel) for torque in request.torques
+                torque: settings.oscillator(mesh, torque, pinion=pinion, wheel=wheel) for torque in self.torques
             }
         natural = {
             name: {torque: natural_frequencies(one) for torque, one in several.items()}
@@ -183,7 +192,7 @@ class DynamicsStudy(AbstractStudy[DynamicsResult]):
             steps = _steps(settings, oscillators, natural)
         stages.begin("running through the speeds")
         responses: dict[str, dict[float, dict[str, Any]]] = {}
-        total, done = len(designs) * len(request.torques) * len(settings.run_names), 0
+        total, done = len(designs) * len(self.torques) * len(settings.run_names), 0
         kept = checkpoints.of(SpeedResponses(), total)
         for name, of_torques in oscillators.items():
             responses[name] = {}
@@ -195,20 +204,32 @@ class DynamicsStudy(AbstractStudy[DynamicsResult]):
                     runs[run] = kept((made_of, run, steps), partial(settings.run, oscillator, run, steps=steps))
                     done += 1
         run_ups: dict[str, dict[float, RunUp]] = {}
-        if request.run_up is not None:
+        if self.run_up is not None:
             stages.begin("running up")
             first, last = (float(settings.mesh_frequencies[place]) for place in (0, -1))
-            options: dict[str, Any] = {"first": first, "last": last, "duration": request.run_up, "steps": steps[0]}
+            options: dict[str, Any] = {"first": first, "last": last, "duration": self.run_up, "steps": steps[0]}
             run_ups = {
                 name: {torque: run_up(oscillator, **options) for torque, oscillator in of_torques.items()}
                 for name, of_torques in oscillators.items()
             }
         stages.begin("following the orbits of the unmodified design")
-        torque = next_to_design(design, request)
+        torque = next_to_design(design, self.torques)
         runs = responses["unmodified"][torque]
         branches = branches_of(oscillators["unmodified"][torque], {UP: runs[UP]} if self.quick else runs, steps)
         frequencies = {
             name: {torque: float(of.mesh) for torque, of in several.items()} for name, several in natural.items()
         }
-        found = responses, steps, tuple(branches), run_ups
-        return DynamicsResult(design, request, mesh, designs, oscillators, frequencies, *found)
+        return DynamicsResult(
+            design,
+            settings,
+            self.torques,
+            self.run_up,
+            mesh,
+            designs,
+            oscillators,
+            frequencies,
+            responses,
+            steps,
+            tuple(branches),
+            run_ups,
+        )

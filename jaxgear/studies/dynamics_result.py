@@ -2,7 +2,7 @@
 
 import csv
 import dataclasses
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
@@ -11,9 +11,9 @@ import numpy as np
 
 from ..contact import Mesh
 from ..contact.status import reason
-from ..dynamics import DOWN, KICKED, UP, Branch, Oscillator, RunUp, SpeedResponse, inertia_of, motion
+from ..dynamics import DOWN, KICKED, UP, Branch, Dynamics, Oscillator, RunUp, SpeedResponse, inertia_of, motion
 from ..dynamics.response import FORCE_REFERENCE
-from ..io import DesignFile, DynamicsRequest
+from ..io import DesignFile
 from ..microgeometry import AbstractModification
 from ..report import Table
 from .evaluation import grid_lines
@@ -42,7 +42,9 @@ class DynamicsResult(AbstractStudyResult):
 
     Attributes:
         design: the design file.
-        request: settings of the study in the file.
+        settings: speeds and vibrating masses.
+        torques: torques on the pinion [N m], ascending.
+        run_up: duration of a run-up [s]; None for no run-up.
         mesh: mesh on which the designs are compared.
         designs: modifications (pinion, wheel) by design.
         oscillators: oscillators by design and torque [N m].
@@ -60,7 +62,9 @@ class DynamicsResult(AbstractStudyResult):
     )
 
     design: DesignFile
-    request: DynamicsRequest
+    settings: Dynamics
+    torques: tuple[float, ...]
+    run_up: float | None
     mesh: Mesh
     designs: Mapping[str, tuple[AbstractModification, AbstractModification]]
     oscillators: Mapping[str, Mapping[float, Oscillator]]
@@ -81,7 +85,7 @@ class DynamicsResult(AbstractStudyResult):
     @property
     def torque(self) -> float:
         """The torque next to the design torque [N m]."""
-        return next_to_design(self.design, self.request)
+        return next_to_design(self.design, self.torques)
 
     def tables(self) -> Iterator[Table]:
         """The peaks of every run."""
@@ -115,10 +119,10 @@ class DynamicsResult(AbstractStudyResult):
                 for name, of_torques in self.run_ups.items()
             }
             said = ", ".join(f"{name} {factor:.3f} at {at:.0f} Hz" for name, (factor, at) in highest.items())
-            yield f"largest dynamic factor of a run-up in {self.request.run_up:g} s: {said}"
+            yield f"largest dynamic factor of a run-up in {self.run_up:g} s: {said}"
         if self.grid_change:
             steps = " to ".join(f"{count}" for count in dict.fromkeys((min(self.steps), max(self.steps))))
-            grid = f"{self.request.settings.positions} positions of the mesh force and {steps} steps per mesh cycle"
+            grid = f"{self.settings.positions} positions of the mesh force and {steps} steps per mesh cycle"
             yield from grid_lines(grid, self.grid_change)
         yield from self._still_rising()
         yield from self._far_from_resonance()
@@ -130,7 +134,7 @@ class DynamicsResult(AbstractStudyResult):
 
     def _still_rising(self) -> Iterator[str]:
         """A line for designs whose largest dynamic factor is that of the highest speed, below the natural frequency."""
-        highest = float(self.request.settings.mesh_frequencies[-1])
+        highest = float(self.settings.mesh_frequencies[-1])
         rising = {
             name: None
             for name, torque, _, response in self.rows()
@@ -145,7 +149,7 @@ class DynamicsResult(AbstractStudyResult):
     def _far_from_resonance(self) -> Iterator[str]:
         """A line where every speed is far above or below what can resonate: then a mass is likely to be wrong."""
         natural = self.natural_frequencies["unmodified"][self.torque]
-        low, high = (float(self.request.settings.mesh_frequencies[place]) / natural for place in (0, -1))
+        low, high = (float(self.settings.mesh_frequencies[place]) / natural for place in (0, -1))
         if low > _FAR or high < 1 / _FAR:
             yield (
                 f"WARNING: all speeds lie at {low:.3g} to {high:.3g} times the natural frequency of {natural:.4g} "
@@ -154,7 +158,7 @@ class DynamicsResult(AbstractStudyResult):
 
     def _bodies(self) -> Iterator[str]:
         """A line for gears whose bore is left open, which is another for the compliance than for the inertia."""
-        settings, pair = self.request.settings, self.design.pair()
+        settings, pair = self.settings, self.design.pair()
         given = ("pinion", pair.pinion, settings.pinion_inertia), ("wheel", pair.wheel, settings.wheel_inertia)
         for name, gear, inertia in given:
             if gear.bore_diameter is None and inertia is None:
@@ -177,7 +181,7 @@ class DynamicsResult(AbstractStudyResult):
 
     def summary(self) -> dict[str, Any]:
         """The runs of all designs, with what vibrates."""
-        settings = self.request.settings
+        settings = self.settings
         given = {field.name: getattr(settings, field.name) for field in dataclasses.fields(settings)}
         frequencies = np.asarray(given.pop("mesh_frequencies"))
         designs: dict[str, Any] = {}
@@ -202,10 +206,10 @@ class DynamicsResult(AbstractStudyResult):
                     for torque, (factor, at) in of_torques.items()
                 ]
         return {
-            "torques_Nm": self.request.torques,
+            "torques_Nm": self.torques,
             "mesh_frequencies_Hz": [float(frequencies[0]), float(frequencies[-1])],
             "speeds": len(frequencies),
-            **({} if self.request.run_up is None else {"run_up_s": self.request.run_up}),
+            **({} if self.run_up is None else {"run_up_s": self.run_up}),
             "force_level_reference_N": FORCE_REFERENCE,
             "settings": {name: value for name, value in given.items() if value is not None},
             "equivalent_mass_kg": np.asarray(self.oscillators["unmodified"][self.torque].mass),
@@ -257,7 +261,7 @@ class DynamicsResult(AbstractStudyResult):
         """Responses of all designs, and the first and the last design more closely."""
         from .. import plot
 
-        torques = self.request.torques
+        torques = self.torques
         size: dict[str, Any] = {"columns": len(torques), "width": _PANEL * len(torques), "height": _HEIGHT}
         axes: dict[str, Any] = {}
         for field in ("dynamic_factor", "dte_rms"):
@@ -271,7 +275,7 @@ class DynamicsResult(AbstractStudyResult):
             with plot.figure.report_axes(None, **size) as panels:
                 for number, (panel, torque) in enumerate(zip(np.ravel(panels), torques)):
                     risen = {name: {"rising": of[torque]} for name, of in self.run_ups.items()}
-                    plot.speed_response(risen, ax=panel, title=f"{torque:g} N m, rising in {self.request.run_up:g} s")
+                    plot.speed_response(risen, ax=panel, title=f"{torque:g} N m, rising in {self.run_up:g} s")
                     self._finish(panel, number)
             axes["run_up"] = panels
         shown = list(dict.fromkeys((next(iter(self.designs)), list(self.designs)[-1])))
@@ -332,9 +336,9 @@ class DynamicsResult(AbstractStudyResult):
         plot.phase_portrait(moved.dte, moved.dte_rate, moved.force, panel, once=once, title=title)
 
 
-def next_to_design(design: DesignFile, request: DynamicsRequest) -> float:
+def next_to_design(design: DesignFile, torques: Sequence[float]) -> float:
     """The torque of a study next to the design torque [N m]."""
-    return min(request.torques, key=lambda torque: abs(torque - design.torque))
+    return min(torques, key=lambda torque: abs(torque - design.torque))
 
 
 def peak(response: SpeedResponse | RunUp, field: str) -> tuple[float, float]:

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..contact.status import reason
 from ..dynamics.mesh_tables import FILES, MeshTables, mesh_tables
-from ..io import DesignFile, OptimizeRequest
+from ..io import DesignFile, Search
 from ..numerics import changed
 from ..report import Table
 from .checkpoints import Checkpoints
@@ -36,7 +36,7 @@ class ExportStudy(AbstractStudy["ExportResult"]):
 
     name: ClassVar = "export"
 
-    search: OptimizeRequest | None
+    search: Search | None
 
     @classmethod
     def of(cls, design: DesignFile, *, quick: bool = False) -> Self:

@@ -1,18 +1,20 @@
 """The layout study: from a design file with shafts to its flank lines and profiles, in three steps."""
 
 from dataclasses import dataclass, replace
-from typing import ClassVar, Self
+from typing import Any, ClassVar, Self
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 
 from ..contact import Mesh, MeshCycle, Resolution, solve
-from ..io import DesignFile, LayoutRequest, layout_request
+from ..io import DesignFile, DesignFileError
+from ..io.errors import naming
 from ..io.layout_table import ProfileSection
 from ..layout import (
     FlankLine,
     FlankLineLayout,
+    FlankLineTolerance,
     ProfileLayout,
     at_stations,
     at_torque,
@@ -21,6 +23,7 @@ from ..layout import (
     layout_findings,
     layout_flank_lines,
     vary_profiles,
+    without_housing,
 )
 from ..shafts import AbstractSupport, ShaftSupport, annex_e
 from . import manufactured
@@ -29,6 +32,9 @@ from .evaluation import coarse, face_change
 from .layout_result import LayoutResult, flank_lines
 from .progress import Stages
 from .study import AbstractStudy
+
+_QUICK_STATIONS, _QUICK_AMOUNTS = 21, 3
+_TORQUES, _QUICK_TORQUES = 25, 7  # over the range of the file
 
 
 @dataclass(frozen=True)
@@ -39,19 +45,44 @@ class LayoutStudy(AbstractStudy[LayoutResult]):
     edges within the tolerances, step 3 tries profile modifications in all combinations. With and without housing.
 
     Attributes:
-        request: what the file asks for.
+        supports: mesh on its shafts, in the housing first where there is one, then on rigid seats.
+        tolerances: tolerances of the flank lines by the kind of their sum.
+        options: options of `layout_flank_lines`.
+        torques: torques of K_Hbeta on the pinion, those of the duty cycle included [N m].
+        profile: profile modifications that step 3 tries; None for no step 3.
+        profile_torque: torque of step 3 on the pinion [N m].
     """
 
     name: ClassVar = "layout"
     coarse: ClassVar = "few stations and variants"
     takes_shafts: ClassVar = True
 
-    request: LayoutRequest
+    supports: dict[str, ShaftSupport]
+    tolerances: dict[str, FlankLineTolerance]
+    options: dict[str, Any]
+    torques: np.ndarray
+    profile: ProfileSection | None
+    profile_torque: float
 
     @classmethod
     def of(cls, design: DesignFile, *, quick: bool = False) -> Self:
         """Layout study of a design file, see `AbstractStudy.of`."""
-        return cls(design, quick, layout_request(design, quick=quick))
+        with naming(design.path):
+            section = design.needed("layout", "it says for which tolerances the flank lines are designed")
+            support, profile = design.support, section.profile
+            assert support is not None  # every file with the table has one
+            _check_open(design)
+            if quick:
+                section = section.changed(stations=min(section.stations, _QUICK_STATIONS))
+            tolerances, options = section.tolerances(design), section.options(design)
+            if profile is not None:
+                profile = profile.variants(_QUICK_AMOUNTS if quick else None)
+        housed = support.gearbox.housing is not None
+        supports = {"housing": support, "rigid seats": without_housing(support)} if housed else {"rigid seats": support}
+        range_of_file = np.linspace(*design.torque_range, _QUICK_TORQUES if quick else _TORQUES)
+        torques = np.union1d(range_of_file, section.torques or [])
+        torque = design.torque if profile is None else profile.torque_factor * design.torque
+        return cls(design, quick, supports, tolerances, options, torques, profile, torque)
 
     def omits(self) -> str:
         """Tolerances other than those of the flank lines."""
@@ -59,49 +90,49 @@ class LayoutStudy(AbstractStudy[LayoutResult]):
 
     def work_out(self, checkpoints: Checkpoints, stages: Stages) -> LayoutResult:
         """Flank lines on every support, then profile modifications; keeps no checkpoints."""
-        design, request, quick = self.design, self.request, self.quick
+        design, quick = self.design, self.quick
         layouts: dict[str, FlankLineLayout] = {}
-        for name, support in request.supports.items():
+        for name, support in self.supports.items():
             stages.begin(f"flank lines, {name}")
-            layouts[name] = layout_flank_lines(support, request.tolerances, **request.options)
+            layouts[name] = layout_flank_lines(support, self.tolerances, **self.options)
         stages.begin("face load factor over the torque")
-        over_torque = _over_torque(request, next(iter(layouts.values())))
+        over_torque = _over_torque(self, next(iter(layouts.values())))
         meshes: dict[str, Mesh] = {}
         contacts: dict[str, dict[str, dict[str, float]]] = {}
         cases: dict[str, dict[str, dict[str, np.ndarray]]] = {}
         cycles: dict[str, MeshCycle] = {}
         factors: dict[str, dict[str, float]] = {}
         profiles: dict[str, ProfileLayout] = {}
-        wanted = request.profile
+        wanted = self.profile
         if wanted is not None:
             for name in layouts if wanted.shafts else list(layouts)[:1]:
                 stages.begin("preparing the mesh" + (f", {name}" if wanted.shafts else ""))
                 size = design.resolution()
-                held = _held(request.supports[name], request.profile_torque, size)
+                held = _held(self.supports[name], self.profile_torque, size)
                 given = coarse(size) if quick else size, held if wanted.shafts else None
                 mesh = jax.block_until_ready(design.mesh(*given, rigid=not wanted.shafts))
                 stages.begin("profile modifications of both gears" + (f", {name}" if wanted.shafts else ""))
-                meshes[name], profiles[name] = mesh, _profile(request, wanted, mesh, layouts[name], stages)
+                meshes[name], profiles[name] = mesh, _profile(self, wanted, mesh, layouts[name], stages)
                 if wanted.shafts:
-                    contacts[name], cases[name] = _contacts(request, mesh, layouts[name], profiles[name])
-                    cycles = cycles or _cycles(request, mesh, layouts[name], profiles[name])
-                    factors[name] = _factors(request, name, layouts[name], stations=size.slices)
+                    contacts[name], cases[name] = _contacts(self, mesh, layouts[name], profiles[name])
+                    cycles = cycles or _cycles(self, mesh, layouts[name], profiles[name])
+                    factors[name] = _factors(self, name, layouts[name], stations=size.slices)
         stations_change: dict[str, dict[str, float]] = {}
         slices_change: dict[str, dict[str, float]] = {}
         if not quick:
             stages.begin("face load factor on a finer grid")
-            name, stations = next(iter(layouts)), request.options["stations"]
-            once, again = (_factors(request, name, layouts[name], stations=count) for count in (stations, 2 * stations))
+            name, stations = next(iter(layouts)), self.options["stations"]
+            once, again = (_factors(self, name, layouts[name], stations=count) for count in (stations, 2 * stations))
             stations_change = {step: {"face_load_factor": again[step] - value} for step, value in once.items()}
             if cycles:
-                finer = _finer(design, request, name)
-                between = _cycles(request, finer, layouts[name], profiles[name])
+                finer = _finer(self, name)
+                between = _cycles(self, finer, layouts[name], profiles[name])
                 slices_change = {which: face_change(cycle, between[which]) for which, cycle in cycles.items()}
-        duty_cycle = request.options.get("duty_cycle")
+        duty_cycle = self.options.get("duty_cycle")
         unusual = {
             name: layout_findings(
                 layout,
-                request.supports[name],
+                self.supports[name],
                 duty_cycle=duty_cycle,
                 profiles=profiles.get(name),
                 contact=cases.get(name),
@@ -110,7 +141,11 @@ class LayoutStudy(AbstractStudy[LayoutResult]):
         }
         return LayoutResult(
             design,
-            request,
+            self.supports,
+            self.tolerances,
+            self.options,
+            self.torques,
+            self.profile_torque,
             layouts,
             over_torque,
             meshes,
@@ -125,35 +160,45 @@ class LayoutStudy(AbstractStudy[LayoutResult]):
         )
 
 
-def _finer(design: DesignFile, request: LayoutRequest, name: str) -> Mesh:
+def _check_open(design: DesignFile) -> None:
+    """Raises a `DesignFileError` for what a layout finds itself."""
+    if design.bounds:
+        raise DesignFileError("variables", f"layout needs numbers, these are free: {', '.join(design.bounds)}")
+    for gear, parts in (("pinion", design.design.pinion), ("wheel", design.design.wheel)):
+        if parts:
+            raise DesignFileError(f"{gear}.modification", "layout finds the modifications, leave them out")
+
+
+def _finer(study: LayoutStudy, name: str) -> Mesh:
     """The mesh of step 3 on its shafts with twice the slices."""
+    design = study.design
     size = design.resolution()
     widths = None if size.parts is None else tuple(int(part) for part in np.repeat(size.parts, 2))
     twice = replace(size, slices=2 * size.slices, slice_widths=widths)
-    return design.mesh(twice, _held(request.supports[name], request.profile_torque, twice), rigid=False)
+    return design.mesh(twice, _held(study.supports[name], study.profile_torque, twice), rigid=False)
 
 
-def _over_torque(request: LayoutRequest, layout: FlankLineLayout) -> dict[str, np.ndarray]:
+def _over_torque(study: LayoutStudy, layout: FlankLineLayout) -> dict[str, np.ndarray]:
     """K_Hbeta of the design over the torque after every step."""
-    support, stations = next(iter(request.supports.values())), request.options["stations"]
+    support, stations = next(iter(study.supports.values())), study.options["stations"]
     found = {}
     for step, (pinion, wheel) in flank_lines(layout).items():
         given = {"pinion": pinion, "wheel": wheel, "stations": stations}
-        found[step] = np.asarray(face_load_over_torques(support, request.torques, **given))
+        found[step] = np.asarray(face_load_over_torques(support, study.torques, **given))
     return found
 
 
 def _contacts(
-    request: LayoutRequest, mesh: Mesh, layout: FlankLineLayout, profile: ProfileLayout
+    study: LayoutStudy, mesh: Mesh, layout: FlankLineLayout, profile: ProfileLayout
 ) -> tuple[dict[str, dict[str, float]], dict[str, dict[str, np.ndarray]]]:
     """Contact results of every step without deviations, and K_Hbeta in the five cases by tolerance and step."""
     found = {}
-    cases: dict[str, dict[str, np.ndarray]] = {name: {} for name in request.tolerances}
-    deviations = np.concatenate([one.slopes for one in request.tolerances.values()])
+    cases: dict[str, dict[str, np.ndarray]] = {name: {} for name in study.tolerances}
+    deviations = np.concatenate([one.slopes for one in study.tolerances.values()])
     for step, (pinion, wheel) in flank_lines(layout).items():
         modifications = pinion.modification, wheel.modification
         all_cases = flank_line_contact(
-            mesh, request.profile_torque, modifications, deviations=deviations, kind=profile.kind
+            mesh, study.profile_torque, modifications, deviations=deviations, kind=profile.kind
         )
         found[step] = {name: float(values[0]) for name, values in all_cases.items()}
         for name, factors in zip(cases, all_cases["face_load_factor"].reshape(len(cases), -1)):
@@ -162,24 +207,22 @@ def _contacts(
     return found, cases
 
 
-def _cycles(
-    request: LayoutRequest, mesh: Mesh, layout: FlankLineLayout, profile: ProfileLayout
-) -> dict[str, MeshCycle]:
+def _cycles(study: LayoutStudy, mesh: Mesh, layout: FlankLineLayout, profile: ProfileLayout) -> dict[str, MeshCycle]:
     """The contact without modification and with all three steps."""
     modified = tuple(line + own for line, own in zip(layout.modifications, profile.profiles))
     # of zero amounts: one program serves both
     nothing = jax.tree.map(jnp.zeros_like, modified)
-    torque = request.profile_torque
+    torque = study.profile_torque
     return {
         name: solve(mesh, torque, pinion=pinion, wheel=wheel)
         for name, (pinion, wheel) in (("unmodified", nothing), ("layout", modified))
     }
 
 
-def _factors(request: LayoutRequest, name: str, layout: FlankLineLayout, *, stations: int) -> dict[str, float]:
+def _factors(study: LayoutStudy, name: str, layout: FlankLineLayout, *, stations: int) -> dict[str, float]:
     """K_Hbeta of the one-dimensional analysis by step."""
     found = {}
-    face = at_stations(request.supports[name], request.profile_torque, stations=stations)
+    face = at_stations(study.supports[name], study.profile_torque, stations=stations)
     for step, (pinion, wheel) in flank_lines(layout).items():
         load = annex_e(face, face.torque, pinion=pinion.modification, wheel=wheel.modification, stations=stations)
         found[step] = float(load.face_load_factor)
@@ -194,14 +237,14 @@ def _held(support: ShaftSupport, torque: float, size: Resolution) -> AbstractSup
 
 
 def _profile(
-    request: LayoutRequest, wanted: ProfileSection, mesh: Mesh, layout: FlankLineLayout, stages: Stages
+    study: LayoutStudy, wanted: ProfileSection, mesh: Mesh, layout: FlankLineLayout, stages: Stages
 ) -> ProfileLayout:
     """Step 3 on the flank lines, or on what they leave where they have levelled the load: the further crowning."""
     for_pinion, for_wheel = (FlankLine(crowning=amount) for amount in layout.further)
     left = for_pinion.on(layout.pair, "pinion").modification, for_wheel.on(layout.pair, "wheel").modification
     return vary_profiles(
         mesh,
-        request.profile_torque,
+        study.profile_torque,
         layout.modifications if wanted.shafts else left,
         wanted.pinion_amounts,
         wanted.wheel_amounts or wanted.pinion_amounts,

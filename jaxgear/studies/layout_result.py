@@ -10,13 +10,21 @@ import numpy as np
 from ..contact import Mesh, MeshCycle
 from ..contact.kinematics import kinematics
 from ..contact.status import Status
-from ..io import DesignFile, LayoutRequest, write_flanks
-from ..layout import CASES, FlankLine, FlankLineLayout, ProfileLayout, ToleranceCases, gear_lives
+from ..io import DesignFile, write_flanks
+from ..layout import (
+    CASES,
+    FlankLine,
+    FlankLineLayout,
+    FlankLineTolerance,
+    ProfileLayout,
+    ToleranceCases,
+    gear_lives,
+)
 from ..metrics import Finding
 from ..microgeometry import AbstractModification
 from ..numerics import Given, real
 from ..report import Table
-from ..shafts import bearing_reactions, root_face_load_factor, tooth_height
+from ..shafts import ShaftSupport, bearing_reactions, root_face_load_factor, tooth_height
 from ..sweeps.columns import described
 from .evaluation import grid_lines
 from .side_by_side import finding_lines
@@ -35,9 +43,13 @@ class LayoutResult(AbstractStudyResult):
 
     Attributes:
         design: the design file.
-        request: settings of the study in the file.
+        supports: mesh on its shafts, in the housing first where there is one, then on rigid seats.
+        tolerances: tolerances of the flank lines by the kind of their sum.
+        options: options of `layout_flank_lines`.
+        torques: torques of K_Hbeta on the pinion [N m].
+        profile_torque: torque of step 3 on the pinion [N m].
         layouts: flank lines, by the name of the support; the first is that of the design.
-        over_torque: K_Hbeta of the design after every of the `STEPS` at the torques of the request, without deviations.
+        over_torque: K_Hbeta of the design after every of the `STEPS` at the torques, without deviations.
         meshes: meshes of step 3, by the name of the support; empty without step 3.
         contacts: contact results of the flank lines of every step on their shafts, by the names of the support and of
             the step; empty without step 3 on shafts.
@@ -54,7 +66,11 @@ class LayoutResult(AbstractStudyResult):
     """
 
     design: DesignFile
-    request: LayoutRequest
+    supports: Mapping[str, ShaftSupport]
+    tolerances: Mapping[str, FlankLineTolerance]
+    options: Mapping[str, Any]
+    torques: np.ndarray
+    profile_torque: float
     layouts: Mapping[str, FlankLineLayout]
     over_torque: Mapping[str, np.ndarray]
     meshes: Mapping[str, Mesh]
@@ -82,7 +98,7 @@ class LayoutResult(AbstractStudyResult):
 
         That factor is of the torque of step 3 and stands for every load. Empty without a duty cycle.
         """
-        load, strength = (self.request.options.get(name) for name in ("duty_cycle", "strength"))
+        load, strength = (self.options.get(name) for name in ("duty_cycle", "strength"))
         if load is None or strength is None:
             return {}
         found = gear_lives(self.design.pair(), load, strength, profile.table.column("face_load_factor"))
@@ -118,7 +134,7 @@ class LayoutResult(AbstractStudyResult):
         for name, profile in self.profiles.items():
             yield from self._profile_verdict(profile, f", {name}" if len(self.profiles) > 1 else "")
         if self.stations_change:
-            grid = f"{self.request.options['stations']} stations (ISO 6336-1 Annex E)"
+            grid = f"{self.options['stations']} stations (ISO 6336-1 Annex E)"
             yield from grid_lines(grid, self.stations_change)
         if self.slices_change:
             yield from grid_lines(f"{self.design.resolution().slices} slices (contact analysis)", self.slices_change)
@@ -126,7 +142,7 @@ class LayoutResult(AbstractStudyResult):
     def _profile_verdict(self, profile: ProfileLayout, where: str) -> Iterator[str]:
         words = "tip relief" if profile.kind == "tip_relief" else "profile crowning"
         first, second = profile.amounts
-        torque = self.request.profile_torque
+        torque = self.profile_torque
         long = "" if profile.length is None else f", {profile.length:.3g} mm long"
         yield f"step 3 at {torque:g} N m{where}: {words} {first:g} um on the pinion, {second:g} um on the wheel{long}"
         if any(profile.further):
@@ -153,7 +169,7 @@ class LayoutResult(AbstractStudyResult):
                 yield f"the largest load is at an edge: {name}"
         known = np.isfinite(list(self.over_torque.values())).all(axis=0)
         if not known.all():
-            missed = ", ".join(f"{torque:g}" for torque in self.request.torques[~known])
+            missed = ", ".join(f"{torque:g}" for torque in self.torques[~known])
             yield f"LOAD OVER THE FACE NOT CONVERGED at {missed} N m"
         for name, steps in self.contacts.items():
             for step, numbers in steps.items():
@@ -177,16 +193,16 @@ class LayoutResult(AbstractStudyResult):
             "torque_Nm": self.design.torque,
             "tolerances": {
                 name: {"f_Hbeta_um": one.helix_slope, "f_ma_um": one.misalignment}
-                for name, one in self.request.tolerances.items()
+                for name, one in self.tolerances.items()
             },
             "layouts": {
                 name: {**_layout(layout), "findings": [finding_data(finding) for finding in self.unusual[name]]}
                 for name, layout in self.layouts.items()
             },
-            "face_load_over_torque": {"torque_Nm": self.request.torques, **_by_step(self.over_torque)},
+            "face_load_over_torque": {"torque_Nm": self.torques, **_by_step(self.over_torque)},
             "contact": {
                 name: {
-                    "torque_Nm": self.request.profile_torque,
+                    "torque_Nm": self.profile_torque,
                     **_by_step(steps),
                     "annex_e_face_load_factor": _by_step(self.factors[name]),
                     "cases": CASES,
@@ -198,7 +214,7 @@ class LayoutResult(AbstractStudyResult):
             },
             **({"change_at_twice_the_stations": _by_step(self.stations_change)} if self.stations_change else {}),
             **({"change_at_twice_the_slices": self.slices_change} if self.slices_change else {}),
-            "bearings": {name: _reactions(support) for name, support in self.request.supports.items()},
+            "bearings": {name: _reactions(support) for name, support in self.supports.items()},
             "profiles": {name: self._profile(profile) for name, profile in self.profiles.items()},
             "designs": {name: flanks_data(*flanks) for name, flanks in self.designs().items()},
         }
@@ -207,7 +223,7 @@ class LayoutResult(AbstractStudyResult):
         values = {name: profile.table.column(name) for name in profile.table.results} | self.lives(profile)
         return {
             "type": profile.kind,
-            "torque_Nm": self.request.profile_torque,
+            "torque_Nm": self.profile_torque,
             "variants": len(profile.table),
             "amounts_um": profile.amounts,
             "length_mm": profile.length,
@@ -244,9 +260,9 @@ class LayoutResult(AbstractStudyResult):
         for index, gear in enumerate(("pinion", "wheel")):
             row(f"step 2, {gear}: crowning C_b [um]", (f"{float(one.further[index]):.2f}" for one in each))
         row("  least of both together [um]", (f"{float(one.needed):.2f}" for one in each))
-        for name in self.request.tolerances:
+        for name in self.tolerances:
             result.add_section()
-            tolerance = self.request.tolerances[name]
+            tolerance = self.tolerances[name]
             row(
                 f"{name}: f_Hb {float(tolerance.helix_slope):.1f}, f_ma {float(tolerance.misalignment):.1f} um",
                 ("unmodified / step 1 / step 2" for _ in each),
@@ -268,7 +284,7 @@ class LayoutResult(AbstractStudyResult):
 
     def _contacts(self) -> Table:
         """The contact analysis of every step, beside the one-dimensional one at the same torque."""
-        title = f"contact analysis at {self.request.profile_torque:g} N m, without deviations"
+        title = f"contact analysis at {self.profile_torque:g} N m, without deviations"
         result = Table(("", "K_Hbeta", "K_Fbeta", "edge load factor", "K_Hbeta of Annex E"), title=title)
         for support, steps in self.contacts.items():
             for step, found in steps.items():
@@ -279,7 +295,7 @@ class LayoutResult(AbstractStudyResult):
 
     def _contact_cases(self) -> Table:
         """K_Hbeta of the contact analysis in the five cases."""
-        title = f"K_Hbeta of the contact analysis at {self.request.profile_torque:g} N m in the cases of deviations"
+        title = f"K_Hbeta of the contact analysis at {self.profile_torque:g} N m in the cases of deviations"
         result = Table(("", *CASES), title=title)
         for support, tolerances in self.contact_cases.items():
             for tolerance, steps in tolerances.items():
@@ -289,7 +305,7 @@ class LayoutResult(AbstractStudyResult):
 
     def _bearings(self) -> Table:
         """Displacements of the shafts at the bearings."""
-        found = {name: bearing_reactions(support.gearbox) for name, support in self.request.supports.items()}
+        found = {name: bearing_reactions(support.gearbox) for name, support in self.supports.items()}
         header = "bearing", "force [N]", "axial [N]", *(f"{way}, {name}" for name in found for way in "xy")
         result = Table(header, title="bearings: displacement of the shaft [um]")
         first = next(iter(found.values()))
@@ -323,9 +339,9 @@ class LayoutResult(AbstractStudyResult):
         shown = {f"{step}, {kind}": one for step, of in zip(STEPS, layout.cases) for kind, one in of.items()}
         axes["face_load_factors"] = plot.face_load_factors(shown)
         axes["face_load_over_torque"] = plot.face_load_over_torque(
-            self.request.torques, self.over_torque, design_torque=self.design.torque
+            self.torques, self.over_torque, design_torque=self.design.torque
         )
-        axes["shaft_deflection"] = plot.shaft_deflection(next(iter(self.request.supports.values())).gearbox)
+        axes["shaft_deflection"] = plot.shaft_deflection(next(iter(self.supports.values())).gearbox)
         if self.cycles:
             axes["transmission_error"] = plot.transmission_error(self.cycles)
             axes["load_sharing"] = plot.load_sharing(self.cycles)

@@ -119,7 +119,7 @@ def left_out(design: DesignFile, why: str = "") -> str:
 
 def tolerances(design: DesignFile) -> dict[str, Any]:
     """Table [tolerance] as plain data; empty without the table."""
-    return {"tolerances": design.tables["tolerance"].given()} if "tolerance" in design.tables else {}
+    return {"tolerances": design.tables["tolerance"].fields} if "tolerance" in design.tables else {}
 
 
 def pairs_in_words(design: DesignFile, count: int) -> str:

@@ -44,7 +44,7 @@ class Stages:
         """The callback of a search."""
         self.count(step, total, f"best {best:.4g}")
 
-    def count(self, done: int, total: int, note: str = "") -> None:
+    def count(self, done: int, total: int | None, note: str = "") -> None:
         """How much of the stage is done, and what is next."""
         self._tell(Progress(self._stage, done, total, note))
 

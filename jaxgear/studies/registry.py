@@ -1,7 +1,6 @@
 """The studies by name, those of this package and those that other packages provide; imports one when it is asked for.
 
-A study `XStudy` of this package lies in the module `x` and is one of the public names of `__init__.pyi`. Another
-package names its own as entry points of the group `jaxgear.studies`:
+Another package names its own as entry points of the group `jaxgear.studies`:
 
     [project.entry-points."jaxgear.studies"]
     heat = "my_package.heat:HeatStudy"
@@ -13,16 +12,21 @@ import importlib.util
 from typing import Any
 
 from ..provided import provided as provided_by
-from . import __all__ as public
 
-_ENDING = "Study"
-
-
-def own() -> dict[str, str]:
-    """Place of every study of this package by its name, as `module:class`."""
-    classes = [name for name in public if name.endswith(_ENDING) and not name.startswith("Abstract")]
-    names = {cls: cls.removesuffix(_ENDING).lower() for cls in classes}
-    return {name: f"{__package__}.{name}:{cls}" for cls, name in names.items()}
+# the studies of this package by the names of their commands, likewise
+OWN = {
+    name: f"{__package__}.{place}"
+    for name, place in {
+        "analyze": "analysis:AnalysisStudy",
+        "optimize": "analysis:OptimizationStudy",
+        "sweep": "sweep:SweepStudy",
+        "layout": "layout:LayoutStudy",
+        "dynamics": "dynamics:DynamicsStudy",
+        "wear": "wear:WearStudy",
+        "revolution": "revolution:RevolutionStudy",
+        "export": "export:ExportStudy",
+    }.items()
+}
 
 
 def provided() -> dict[str, str]:

@@ -9,7 +9,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from ..contact.status import reason
-from ..io import DesignFile, OptimizeRequest, teeth_of
+from ..io import DesignFile, Search, teeth_of
 from ..microgeometry import AbstractModification
 from ..numerics import changed
 from ..report import Table
@@ -41,7 +41,7 @@ class RevolutionStudy(AbstractStudy["RevolutionResult"]):
     name: ClassVar = "revolution"
 
     teeth: Teeth
-    search: OptimizeRequest | None
+    search: Search | None
 
     @classmethod
     def of(cls, design: DesignFile, *, quick: bool = False) -> Self:

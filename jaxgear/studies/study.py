@@ -62,6 +62,16 @@ class AbstractStudyResult(abc.ABC):
         """Axes by the name of the picture, drawn anew."""
         return {}
 
+    def reported(self, folder: Path, facts: Sequence[tuple[str, str]], *, figures: bool) -> "AbstractStudyResult":
+        """The result with everything that a report shows besides; by default the result itself.
+
+        Args:
+            folder: folder of the results, for further files.
+            facts: names and texts for the head of a file.
+            figures: True if figures are drawn.
+        """
+        return self
+
     def write(self, folder: Path) -> None:  # noqa: B027 - the default writes nothing
         """Writes further files, such as tables of every number, into a folder; `AbstractStudy.files` names them."""
 
@@ -80,6 +90,9 @@ class AbstractStudy(abc.ABC, Generic[R]):
         coarse: what a quick study has too few of; "" where its result says it.
         needs: modules that it imports late; a command imports them ahead, beside its first compilation.
         files: names of files that its results may have beside those of the studies of jaxgear.
+        report_needs: modules that its report needs besides.
+        grows: elements of a result that grows in its folder, a field `output` of the study, while the study runs for
+            long, such as "variants"; "" if all results are put in place at the end.
         takes_shafts: whether the shafts of the file support the gears at every load.
         takes_coast: whether it knows the coast flanks, which carry a negative torque.
         design: the design file.
@@ -90,6 +103,8 @@ class AbstractStudy(abc.ABC, Generic[R]):
     coarse: ClassVar[str] = "coarse positions"
     needs: ClassVar[tuple[str, ...]] = ()
     files: ClassVar[frozenset[str]] = frozenset()
+    report_needs: ClassVar[tuple[str, ...]] = ()
+    grows: ClassVar[str] = ""
     takes_shafts: ClassVar[bool] = False
     takes_coast: ClassVar[bool] = False
 

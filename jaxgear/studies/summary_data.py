@@ -18,7 +18,7 @@ from ..version import version
 
 def identity(file: DesignFile) -> dict[str, Any]:
     """Title, file name and project data, the beginning of every `summary.json`."""
-    project = {"project": file.tables["project"].given()} if "project" in file.tables else {}
+    project = {"project": file.tables["project"].fields} if "project" in file.tables else {}
     return {"title": file.title, "design_file": file.path.name, **project}
 
 

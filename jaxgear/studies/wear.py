@@ -6,11 +6,11 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, Self
 
 from ..contact import Mesh, OperatingPoint
-from ..io import DesignFile, OptimizeRequest, WearRequest, wear_request
+from ..io import DesignFile, Search
 from ..io.errors import naming
 from ..numerics import optional_real, real
 from ..tolerance import ManufacturedGears
-from ..wear import WearHistory, wear
+from ..wear import Wear, WearHistory
 from . import manufactured, wear_scatter
 from .checkpoints import Checkpoints, CheckpointsOfKind, Marches, NamedArrays
 from .comparison import Modifications, compared, first_mesh, search_of, sought
@@ -18,6 +18,7 @@ from .progress import Stages
 from .study import AbstractStudy
 from .wear_result import OVER_LIFE, WearResult
 
+_QUICK_BLOCKS = 4
 _MOST_BLOCKS = 1000  # of a life of manufactured gears
 
 
@@ -29,7 +30,7 @@ class WearStudy(AbstractStudy[WearResult]):
     the optimum of its variables. What an interrupted command has found is kept: the same command goes on from there.
 
     Attributes:
-        request: what the file asks for.
+        settings: revolutions and wear coefficients.
         search: for the optimum of the file; None where its modifications are numbers.
         over_life: for the lowest mean PPTE over the life, under the static load; None where nothing is sought for it.
         tolerance: of manufactured gears; None where they are not worn.
@@ -38,22 +39,24 @@ class WearStudy(AbstractStudy[WearResult]):
     name: ClassVar = "wear"
     coarse: ClassVar = "coarse positions and few blocks"
 
-    request: WearRequest
-    search: OptimizeRequest | None
-    over_life: OptimizeRequest | None
+    settings: Wear
+    search: Search | None
+    over_life: Search | None
     gears: ManufacturedGears | None
 
     @classmethod
     def of(cls, design: DesignFile, *, quick: bool = False) -> Self:
         """Wear study of a design file, see `AbstractStudy.of`."""
-        request = wear_request(design, quick=quick)
+        with naming(design.path):
+            settings = design.needed("wear", "it says for how long the pair runs and how it wears").settings(design)
+            gears = None if wear_scatter.left_out(design) else manufactured.gears_of(design, quick=quick)
+        if quick:
+            settings = dataclasses.replace(settings, blocks=_QUICK_BLOCKS, largest_increment=None)
         search = search_of(design, quick=quick)
         # a step of the search wears a life: under the static load, which takes far less than a motion in every block
-        static = dataclasses.replace(request.settings, line_load=None, dynamics=None)
+        static = dataclasses.replace(settings, line_load=None, dynamics=None)
         over_life = None if search is None else search.over_life(static)
-        with naming(design.path):
-            gears = None if wear_scatter.left_out(design) else manufactured.gears_of(design, quick=quick)
-        return cls(design, quick, request, search, over_life, gears)
+        return cls(design, quick, settings, search, over_life, gears)
 
     def omits(self) -> str:
         """Manufactured gears under the dynamic line load."""
@@ -75,35 +78,23 @@ class WearStudy(AbstractStudy[WearResult]):
             stages.begin("wear of manufactured gears of all designs")
             # of one length, as quantities take them, and as many as the nominal gears have taken
             blocks = min(max(len(history.revolutions) - 1 for history in histories.values()), _MOST_BLOCKS)
-            settings = dataclasses.replace(self.request.settings, blocks=blocks)
+            settings = dataclasses.replace(self.settings, blocks=blocks, largest_increment=None)
             scatters = wear_scatter.manufactured_wear(
                 mesh, design.torque, designs, settings, self.gears, keep=checkpoints.of(NamedArrays())
             )
-        return WearResult(design, self.request, designs, histories, scatters)
+        return WearResult(design, self.settings, designs, histories, scatters)
 
     def _life(
         self, mesh: Mesh, name: str, flanks: Modifications, kept: CheckpointsOfKind[Any], stages: Stages
     ) -> WearHistory:
         """The life of one design, at the torque of the file."""
         stages.begin(f"wear of the {name} design")
-        design, settings, (pinion, wheel) = self.design, self.request.settings, flanks
+        design, (pinion, wheel) = self.design, flanks
 
         def progress(done: int, total: int, best: float | None) -> None:
             stages.count(done, total, f"{done:.3g} of {total:.3g} revolutions")
 
-        return wear(
-            mesh,
-            settings.loads
-            or OperatingPoint(real(design.torque), optional_real(design.speed), optional_real(design.friction)),
-            settings.revolutions,
-            coefficient=settings.coefficients,
-            pinion=pinion,
-            wheel=wheel,
-            points=settings.points,
-            dynamics=settings.dynamics,
-            line_load=settings.line_load,
-            blocks=settings.blocks,
-            largest_increment=self.request.largest_increment,
-            keep=kept,
-            callback=progress,
-        )
+        load = None
+        if self.settings.loads is None:
+            load = OperatingPoint(real(design.torque), optional_real(design.speed), optional_real(design.friction))
+        return self.settings.history(mesh, load, pinion=pinion, wheel=wheel, keep=kept, callback=progress)

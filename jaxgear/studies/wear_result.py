@@ -10,11 +10,12 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ..contact.status import reason
-from ..io import DesignFile, WearRequest, write_worn
+from ..io import DesignFile, write_worn
 from ..microgeometry import AbstractModification
 from ..report import Table
 from ..vocabulary import quantity_of
 from ..wear import (
+    Wear,
     WearHistory,
     life_to,
     life_to_depth,
@@ -55,7 +56,7 @@ class WearResult(AbstractStudyResult):
 
     Attributes:
         design: the design file.
-        request: what it asks for.
+        settings: revolutions and wear coefficients.
         designs: their modifications (pinion, wheel) by name.
         lives: wear histories by name.
         scatters: numbers of the wear histories of manufactured pairs by name; empty where the file has no tolerances.
@@ -68,14 +69,14 @@ class WearResult(AbstractStudyResult):
     )
 
     design: DesignFile
-    request: WearRequest
+    settings: Wear
     designs: Mapping[str, tuple[AbstractModification, AbstractModification]]
     histories: Mapping[str, WearHistory]
     scatters: Mapping[str, wear_scatter.Samples]
 
     def _numbers(self, history: WearHistory) -> dict[str, float]:
         """Scalar results of a wear history, by name and unit."""
-        ppte, settings = np.asarray(over_life(history, "ppte")), self.request.settings
+        ppte, settings = np.asarray(over_life(history, "ppte")), self.settings
         volume = np.asarray(worn_volume(history))[-1]
         found = {
             "pinion_wear_depth_um": wear_depth(history, "pinion")[-1],
@@ -107,11 +108,11 @@ class WearResult(AbstractStudyResult):
 
     def tables(self) -> list[Table]:
         """The lives of all designs, and their scatter over manufactured pairs where the file has tolerances."""
-        return [self._table(), *wear_scatter.tables(self.design, self.request.settings, self.scatters)]
+        return [self._table(), *wear_scatter.tables(self.design, self.settings, self.scatters)]
 
     def _table(self) -> Table:
         """One row per design."""
-        settings = self.request.settings
+        settings = self.settings
         title = f"{self.design.title}: {float(settings.revolutions):.3g} revolutions at {self._loads()}"
         columns = {
             "pinion_wear_depth_um": "depth\npinion\n[um]",
@@ -140,7 +141,7 @@ class WearResult(AbstractStudyResult):
 
     def _loads(self) -> str:
         """Under what the flanks wear."""
-        settings, text = self.request.settings, self._torques()
+        settings, text = self.settings, self._torques()
         if settings.dynamics is None:
             return text
         speeds: Any = self.design.speed if settings.loads is None else settings.loads.speeds
@@ -148,17 +149,17 @@ class WearResult(AbstractStudyResult):
         return f"{text}, {settings.line_load} line load at {shown} rpm"
 
     def _torques(self) -> str:
-        loads = self.request.settings.loads
+        loads = self.settings.loads
         torques = [self.design.torque] if loads is None else loads.torques.tolist()
         text = ", ".join(f"{torque:g}" for torque in torques) + " N m"
         return text if loads is None else f"{text} ({self._shares()})"
 
     def _shares(self) -> str:
         """Which shares of the revolutions the torques have."""
-        assert self.request.settings.loads is not None
+        assert self.settings.loads is not None
         if self.design.tables["wear"].weights is None:
             return "each for the same share of the revolutions, the default without wear.weights"
-        shares = self.request.settings.loads.weights.tolist()
+        shares = self.settings.loads.weights.tolist()
         return "for " + ", ".join(f"{100 * share:.3g}" for share in shares) + " % of the revolutions"
 
     def verdict(self) -> Iterator[str]:
@@ -182,7 +183,7 @@ class WearResult(AbstractStudyResult):
 
     def _sought(self) -> str:
         """Conditions of the search for the lowest mean PPTE over the wear history."""
-        settings = self.request.settings
+        settings = self.settings
         text = f"sought at {self._torques()}, under the static line load, on gears without deviations"
         vibrates = settings.dynamics is not None and settings.line_load == "dynamic"
         return text + ", not under the dynamic one under which all designs wear here" * vibrates
@@ -206,7 +207,7 @@ class WearResult(AbstractStudyResult):
 
     def summary(self) -> dict[str, Any]:
         """The lives of all designs, with what wears them."""
-        settings = self.request.settings
+        settings = self.settings
         designs = {
             name: {
                 **self._numbers(history),
@@ -218,9 +219,9 @@ class WearResult(AbstractStudyResult):
         }
         return {
             "torque_Nm": self.design.torque,
-            "settings": _without_none(settings),
+            "settings": _without_none(dataclasses.replace(settings, largest_increment=None)),
             **({} if settings.loads is None else {"shares_of_revolutions": self._shares()}),
-            "largest_increment_um": self.request.largest_increment,
+            "largest_increment_um": settings.largest_increment,
             **(manufactured.tolerances(self.design) if self.scatters else {}),
             **({"optimum_over_life": self._sought()} if OVER_LIFE in self.designs else {}),
             "designs": designs,
@@ -234,7 +235,7 @@ class WearResult(AbstractStudyResult):
 
     def _write_lives(self, path: Path) -> None:
         """Every time step of every design as CSV."""
-        vibrates = self.request.settings.dynamics is not None
+        vibrates = self.settings.dynamics is not None
         known = [quantity_of(name) for name in (*_QUANTITIES, *(["dynamic_factor"] if vibrates else []))]
         with path.open("w", newline="", encoding="utf-8") as file:
             writer = csv.writer(file)
@@ -267,7 +268,7 @@ class WearResult(AbstractStudyResult):
             axes[f"worn_{gear}"] = panels
         axes["ppte_over_life"] = plot.wear_history(self.histories, "ppte")
         axes["depth_over_life"] = plot.wear_history(self.histories, "wear_depth")
-        if self.request.settings.dynamics is not None:
+        if self.settings.dynamics is not None:
             axes["dynamic_factor_over_life"] = plot.wear_history(self.histories, "dynamic_factor")
         return axes | wear_scatter.figures(self.scatters)
 

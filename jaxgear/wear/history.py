@@ -26,7 +26,7 @@ Depths = Float[Array, "steps slices points"]
 
 BLOCKS = 20
 
-Make = Callable[[], March]
+Keep = Callable[[Any, Callable[[], March]], March]
 
 
 class WearHistory(WithStatus, Checked):
@@ -118,7 +118,7 @@ def wear(
     dynamics: Dynamics | None = None,
     line_load: LineLoad | None = None,
     largest_increment: Given | None = None,
-    keep: Callable[[Any, Make], March] | None = None,
+    keep: Keep | None = None,
     callback: Callback | None = None,
 ) -> WearHistory:
     """Wear of both flanks, in blocks of revolutions: contact, wear, new flank, again.

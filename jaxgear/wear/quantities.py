@@ -5,6 +5,7 @@ quantity, and a design file has the table [wear].
 """
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from functools import partial
 from typing import Any, cast
 
@@ -75,6 +76,7 @@ def _number(name: str, analysis: Analysis, wear: Wear) -> Float[Array, ""]:
 
 def _life(analysis: Analysis, wear: Wear) -> WearHistory:
     load = analysis.operating_point if wear.loads is None else None
+    wear = replace(wear, largest_increment=None)
     return wear.history(analysis.prepared_mesh, load, **analysis.flanks, deviation=analysis.deviation)
 
 

@@ -11,9 +11,9 @@ from ..contact.operating_point import Torque
 from ..dynamics import Dynamics
 from ..metrics import AbstractSettings
 from ..microgeometry import AbstractModification
-from ..numerics import Numbers, count, number
+from ..numerics import Callback, Numbers, count, number
 from .case import LARGEST_COEFFICIENT
-from .history import BLOCKS, WearHistory, check_blocks, wear
+from .history import BLOCKS, Keep, WearHistory, check_blocks, wear
 from .vibration import LineLoad, check_line_load
 
 Scalar = Float[Array, ""]
@@ -38,6 +38,8 @@ class Wear(AbstractSettings):
             5e-16 for mild wear in mixed lubrication.
         wheel_coefficient: of wear of the wheel; None for that of the pinion.
         blocks: number of blocks of equal length, each a contact analysis and a step of wear; even.
+        largest_increment: depth that no block of a `history` wears off beyond a tenth more, in place of `blocks`; None
+            for blocks of equal length. Quantities take `blocks` in any case.
         points: number of grid points along each flank; None for one and a half times the positions, from 33 to 97.
         depth_limit: wear depth at which the life ends, for `life_to_depth`.
         ppte_limit: peak-to-peak transmission error at which the life ends, for `life_to_ppte`.
@@ -53,6 +55,7 @@ class Wear(AbstractSettings):
     coefficient: Scalar = number("m2/N", low=0.0, high=LARGEST_COEFFICIENT)
     wheel_coefficient: Scalar | None = number("m2/N", low=0.0, high=LARGEST_COEFFICIENT, optional=True, default=None)
     blocks: int = count(low=2, high=100_000, default=BLOCKS)
+    largest_increment: Scalar | None = number("um", low=0.0, open_low=True, optional=True, default=None)
     points: int | None = count(low=3, high=10_000, optional=True, default=None)
     depth_limit: Scalar | None = number("um", low=0.0, open_low=True, optional=True, default=None)
     ppte_limit: Scalar | None = number("um", low=0.0, open_low=True, optional=True, default=None)
@@ -79,6 +82,8 @@ class Wear(AbstractSettings):
         pinion: AbstractModification | None = None,
         wheel: AbstractModification | None = None,
         deviation: Numbers | None = None,
+        keep: Keep | None = None,
+        callback: Callback | None = None,
     ) -> WearHistory:
         """The wear history of a design; arguments and errors as `wear`.
 
@@ -87,6 +92,7 @@ class Wear(AbstractSettings):
             torque: on the pinion [N m], or an `OperatingPoint`; None, and only then, where the settings have loads.
             pinion, wheel: modifications of the new flanks.
             deviation: material that manufacturing deviations remove besides [um].
+            keep, callback: as of `wear`.
 
         Raises:
             ValueError: for a torque beside loads, or neither.
@@ -97,5 +103,6 @@ class Wear(AbstractSettings):
         assert loads is not None
         options: dict[str, Any] = {"coefficient": self.coefficients, "blocks": self.blocks, "points": self.points}
         options |= {"dynamics": self.dynamics, "line_load": self.line_load}
+        options |= {"largest_increment": self.largest_increment, "keep": keep, "callback": callback}
         flanks: dict[str, Any] = {"pinion": pinion, "wheel": wheel, "deviation": deviation}
         return wear(mesh, loads, self.revolutions, **flanks, **options)

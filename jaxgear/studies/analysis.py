@@ -1,15 +1,18 @@
-"""A comparison of designs as it goes on: its mesh, its search, and what it has found so far."""
+"""Analysis and optimization: designs evaluated side by side on one mesh, and the search for the best of them."""
 
 import dataclasses
 import time
 from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar, Self
 
 import jax
 
 from ..compliance import Compliance, TabulatedCompliance
 from ..contact import Mesh
-from ..io import DesignFile, DesignFileError, OptimizeRequest
-from ..microgeometry import AbstractModification
+from ..io import DesignFile, DesignFileError, Search
+from ..io.errors import naming
+from ..microgeometry import AbstractModification, NoModification
 from ..optimize import (
     Front,
     Optimum,
@@ -23,11 +26,13 @@ from ..optimize import (
 )
 from ..tolerance import ManufacturedGears
 from . import manufactured, side_by_side
-from .comparison import Modifications
+from .checkpoints import Checkpoints
+from .comparison import Modifications, rule_based
 from .comparison_result import ComparisonResult
 from .evaluation import Evaluation, coarse, evaluation_of, torques_of
 from .optimum_report import COMPROMISE
 from .progress import Stages
+from .study import AbstractStudy
 
 
 class ComparisonRun:
@@ -90,14 +95,14 @@ class ComparisonRun:
             found = dataclasses.replace(found, objectives=judged(self._problem, pinion, wheel))
         self._evaluations[name] = found
 
-    def search(self, request: OptimizeRequest, beside: Mapping[str, Modifications]) -> None:
+    def search(self, search: Search, beside: Mapping[str, Modifications]) -> None:
         """Finds the optimum, and for flanks without parameters the named curve in their place.
 
         All designs, those `beside` it too, are evaluated on the mesh on which the search has ended and by its measure.
         """
-        self._stages.begin(f"searching the optimum ({request.method})")
+        self._stages.begin(f"searching the optimum ({search.method})")
         began = time.perf_counter()
-        found = request(self._mesh, self._stages.step)
+        found = search(self._mesh, self._stages.step)
         self._front = found if isinstance(found, Front) else None
         optimum = found.compromise if isinstance(found, Front) else found
         spent = time.perf_counter() - began
@@ -111,10 +116,10 @@ class ComparisonRun:
         # of several torques it shows another one than the table does
         ppte = float(evaluated.metrics["ppte_um"])
         self._optimum = optimum = dataclasses.replace(optimum, cycle=evaluated.cycle, ppte=ppte)
-        if request.curve is not None:
-            self._stages.begin(f"projecting the flanks on a {request.curve} curve")
-            self._projection = projection = project(optimum, request.curve)
-            self.evaluate(f"as {request.curve}", projection.pinion, projection.wheel)
+        if search.curve is not None:
+            self._stages.begin(f"projecting the flanks on a {search.curve} curve")
+            self._projection = projection = project(optimum, search.curve)
+            self.evaluate(f"as {search.curve}", projection.pinion, projection.wheel)
         if self._second is not None:
             self._verify(self._second)
 
@@ -146,3 +151,88 @@ class ComparisonRun:
             self._searched_at,
             self._unverified,
         )
+
+
+@dataclass(frozen=True)
+class AnalysisStudy(AbstractStudy[ComparisonResult]):
+    """Analyze the unmodified pair and the modification of the design file.
+
+    Attributes:
+        gears: manufactured gears; None without the table [tolerance].
+    """
+
+    name: ClassVar = "analyze"
+    takes_coast: ClassVar = True
+    coarse: ClassVar = ""
+
+    gears: ManufacturedGears | None
+
+    @classmethod
+    def of(cls, design: DesignFile, *, quick: bool = False) -> Self:
+        """Analysis of a design file in which every variable has a value, see `AbstractStudy.of`."""
+        free = [name for name in design.bounds if design.open_case or name not in design.values]
+        if free:
+            says = "give each a value or use jaxgear optimize"
+            problem = f"analyze needs numbers, these are free: {', '.join(free)}; {says}"
+            raise DesignFileError("variables", problem, design.path)
+        with naming(design.path):
+            return cls(design, quick, manufactured.gears_of(design, quick=quick))
+
+    def omits(self) -> str:
+        """Nothing."""
+        return ""
+
+    def work_out(self, checkpoints: Checkpoints, stages: Stages) -> ComparisonResult:
+        """Both designs; keeps no checkpoints."""
+        run = ComparisonRun(self.design, stages, quick=self.quick)
+        run.prepare()
+        run.evaluate("unmodified", NoModification(), NoModification())
+        pinion, wheel = self.design.design(self.design.values)
+        if not (isinstance(pinion, NoModification) and isinstance(wheel, NoModification)):
+            run.evaluate("modified", pinion, wheel)
+        return run.result(self.gears)
+
+
+@dataclass(frozen=True)
+class OptimizationStudy(AbstractStudy[ComparisonResult]):
+    """Find the best variables or flanks by the method and for the objective of the design file.
+
+    Without a word about them that is the least peak-to-peak transmission error (PPTE) at the design torque. Compares
+    the unmodified pair, the rule-based tip relief of ISO 6336-1, and the optimum.
+
+    Attributes:
+        search: search for the optimum.
+        gears: manufactured gears; None without the table [tolerance].
+    """
+
+    name: ClassVar = "optimize"
+    takes_coast: ClassVar = True
+    coarse: ClassVar = ""  # the result says it
+    needs: ClassVar = ("scipy.optimize",)
+
+    search: Search
+    gears: ManufacturedGears | None
+
+    @classmethod
+    def of(cls, design: DesignFile, *, quick: bool = False, method: str | None = None) -> Self:
+        """Optimization of a design file, see `AbstractStudy.of`; `method` replaces that of the file."""
+        search = Search.of(design, method=method, quick=quick)
+        with naming(design.path):
+            return cls(design, quick, search, manufactured.gears_of(design, quick=quick))
+
+    @property
+    def folder(self) -> str:
+        """Folder of the results of the method below that of the design file."""
+        return f"{self.name}/{self.search.method}"
+
+    def omits(self) -> str:
+        """Nothing."""
+        return ""
+
+    def work_out(self, checkpoints: Checkpoints, stages: Stages) -> ComparisonResult:
+        """All designs; keeps no checkpoints."""
+        run = ComparisonRun(self.design, stages, quick=self.quick)
+        run.prepare(finer=self.search.finer, verify=self.search.verify)
+        relief, involute = rule_based(self.design), NoModification()
+        run.search(self.search, {"unmodified": (involute, involute), "rule-based": (relief, relief)})
+        return run.result(self.gears)
