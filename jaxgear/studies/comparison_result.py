@@ -1,22 +1,30 @@
 """Result of a comparison of designs: tables, text, figures and files."""
 
+import dataclasses
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import equinox as eqx
 import numpy as np
+from jaxtyping import Array, Float
 
 from ..contact import Mesh
+from ..geometry import Gear
 from ..io import DesignFile, write_flanks, write_front
 from ..metrics import Finding
-from ..optimize import Front, Optimum, Projection
-from ..report import Chapter, Table
-from . import comparison_summary, manufactured, optimum_report, side_by_side
+from ..numerics import Number, UnitKey, fields_of, program
+from ..optimize import Front, Optimum, Projection, Verified
+from ..report import Chapter, Figure, Table, numbers, text
+from ..shafts import RigidSupport
+from ..vocabulary import quantities
+from . import manufactured, optimum_report, side_by_side
 from .evaluation import Evaluation
-from .gear_data import mounting
+from .gear_data import FACTORS, gears, mounting, rating_page
 from .optimum_report import front_table
 from .study import AbstractStudyResult
+from .summary_data import finding_data, flanks_data, model, sizes
 
 _USUAL = "none, inputs and results lie within the usual ranges"
 
@@ -51,12 +59,44 @@ class ComparisonResult(AbstractStudyResult):
     searched_at: int = 0
     unverified: str = ""
 
+    def inputs(self) -> dict[str, Any]:
+        """Load, tables, tolerances, model and array sizes."""
+        file = self.design
+        tables = {name: part for name in ("lubricant", "strength") if (part := file.tables.get(name)) is not None}
+        return {
+            UnitKey("torque", "N m"): file.signed_torque,
+            UnitKey("torque_range", "N m"): file.torque_range,
+            UnitKey("speed", "rpm"): file.speed,
+            "friction": file.friction,
+            **{name: _fields(part) for name, part in tables.items()},
+            **manufactured.tolerances(file),
+            "model": model(self.mesh),
+            "resolution": sizes(self.mesh.resolution),
+        }
+
     def summary(self) -> dict[str, Any]:
-        """Every number of the designs, and the optimum."""
-        data = comparison_summary.summary(self.design, self.mesh, self.evaluations, self.torques, self.unusual)
+        """Every number of the gears and designs, and the optimum."""
+        file, mesh, evaluations = self.design, self.mesh, self.evaluations
+        pair = mesh.pair.coast if file.coast else mesh.pair  # of the hands that the file has
+        ppte = {UnitKey(name, "um"): evaluation.ppte for name, evaluation in evaluations.items()}
+        data: dict[str, Any] = {
+            "gears": {name: _gear(getattr(pair, name)) | _drawn(drawn) for name, drawn in file.drawn.items()},
+            UnitKey("center_distance", "mm"): gears(file)["geometry"]["pair"]["center_distance_mm"],
+            **_misalignment(mesh),
+            "designs": {
+                name: {**_design(evaluations[name]), "findings": [finding_data(finding) for finding in several]}
+                for name, several in self.unusual.items()
+            },
+            UnitKey("ppte_reduction", "%"): _reduction(evaluations),
+            "ppte_over_torque": {UnitKey("torque", "N m"): self.torques, **ppte},
+            "iso_6336": self._rating(),
+        }
         if self.optimum is not None:
-            data["optimum"] = optimum_report.summary(self.design, self.optimum, self.projection)
+            data["optimum"] = optimum_report.summary(file, self.optimum, self.projection)
         return data
+
+    def _rating(self) -> dict[str, dict[str, float]]:
+        return {name: {key: of.factors[key] for key in FACTORS} for name, of in self.evaluations.items()}
 
     def write(self, folder: Path) -> None:
         """The flanks of all designs as `flanks.csv`, and a front as `front.csv`."""
@@ -64,14 +104,12 @@ class ComparisonResult(AbstractStudyResult):
         if self.front is not None:
             write_front(folder / "front.csv", self.front)
 
-    def figures(self) -> dict[str, Any]:
+    def figures(self) -> Iterator[Figure]:
         """Designs, their scatter over manufactured gears, and the search."""
-        axes = side_by_side.figures(self.design, self.mesh, self.evaluations, self.torques)
-        axes |= manufactured.figures(self.evaluations)
+        yield from side_by_side.figures(self.design, self.mesh, self.evaluations, self.torques)
+        yield from manufactured.figures(self.evaluations)
         if self.optimum is not None:
-            of = self.mesh, self.design.torque, self.optimum, self.front, self.evaluations
-            axes |= optimum_report.figures(*of)
-        return axes
+            yield from optimum_report.figures(self.mesh, self.design.torque, self.optimum, self.front, self.evaluations)
 
     def headlines(self) -> Iterator[Table]:
         """Summary tables of an optimization, shown before all others; none without an optimum."""
@@ -133,6 +171,89 @@ class ComparisonResult(AbstractStudyResult):
     def _not_converged(self) -> Iterator[str]:
         yield from (*side_by_side.failures(self.evaluations), *manufactured.failures(self.evaluations))
 
-    def chapters(self) -> list[Chapter]:
-        """Robustness, where the file has tolerances."""
-        return manufactured.pages(self.design, self.evaluations)
+    def checks(self) -> Iterator[tuple[str, str]]:
+        """Convergence of all designs, their numbers by finite elements, and the end of the search."""
+        for name, evaluation in self.evaluations.items():
+            yield f"{name}: converged", text(evaluation.metrics["converged"])
+            yield f"{name}: failed torques [N m]", text(evaluation.failed_torques)
+            if evaluation.verified is not None:
+                for key, value in numbers(_verified(evaluation.verified)):
+                    yield f"{name}: by finite elements, {key}", value
+        if self.optimum is not None:
+            yield from optimum_report.checks(self.optimum)
+
+    def chapters(self) -> Iterator[Chapter]:
+        """Robustness, where the file has tolerances, and the rating by ISO 6336."""
+        yield from manufactured.pages(self.design, self.evaluations)
+        yield rating_page(self._rating())
+
+
+def _design(evaluation: Evaluation) -> dict[str, Any]:
+    return {
+        **evaluation.metrics,
+        "change_at_twice_the_positions": evaluation.grid_change,
+        **({"objectives": evaluation.objectives} if evaluation.objectives else {}),
+        **({"verified": _verified(evaluation.verified)} if evaluation.verified else {}),
+        **manufactured.summary(evaluation),
+        UnitKey("failed_torques", "N m"): evaluation.failed_torques,
+        **flanks_data(evaluation.pinion, evaluation.wheel),
+        UnitKey("time", "s"): evaluation.seconds,
+    }
+
+
+def _verified(found: Verified) -> dict[str, Any]:
+    objectives = {"objectives": found.objectives} if found.objectives else {}
+    return {"structure": "finite_element", quantities["ppte"].key: found.ppte, **objectives}
+
+
+def _reduction(evaluations: side_by_side.Evaluations) -> float:
+    """Reduction of the PPTE of the first design, which is unmodified, by the main design [%]."""
+    before = next(iter(evaluations.values())).metrics["ppte_um"]
+    return 100 * (1 - side_by_side.main(evaluations).metrics["ppte_um"] / before) if before else 0.0
+
+
+@program
+def _diameters(gear: Gear) -> dict[str, Float[Array, ""]]:
+    """Diameters of tip, tip form circle and bore [mm], also where they follow from other numbers."""
+    return {
+        "tip_diameter": 2 * gear.tip_radius,
+        "tip_form_diameter": 2 * gear.tip_form_radius,
+        "bore_diameter": 2 * gear.bore_radius,
+    }
+
+
+def _gear(gear: Gear) -> dict[str, Any]:
+    """Every number of a gear, with those that follow from others where the file gives none."""
+    derived, data = _diameters(gear), dict[str, Any](bore_given=gear.bore_diameter is not None)
+    for part in (gear, gear.material):
+        for name, field in fields_of(type(part)).items():
+            data[_key(name, field)] = np.asarray(derived.get(name, getattr(part, name)))
+    return data
+
+
+def _drawn(given: Mapping[str, Any]) -> dict[str, Any]:
+    """Drawing data of the file with `drawn_` before tooth thickness keys, to tell them from the numbers of the gear."""
+    return {
+        UnitKey(f"drawn_{key.name}", key.unit)
+        if isinstance(key, UnitKey) and key.startswith("tooth_thickness")
+        else key: value
+        for key, value in given.items()
+    }
+
+
+def _fields(part: eqx.Module) -> dict[str, Any]:
+    """Numbers and choices that a part has, by name and unit."""
+    given = {field.name: getattr(part, field.name) for field in dataclasses.fields(part)}
+    fields = fields_of(type(part))
+    return {_key(name, fields.get(name)): value for name, value in given.items() if value is not None}
+
+
+def _key(name: str, field: Number | None) -> UnitKey:
+    return UnitKey(name, "" if field is None or field.unit == "x module" else field.unit)
+
+
+def _misalignment(mesh: Mesh) -> dict[str, float]:
+    """Misalignment over the face where the axes are not parallel [um]."""
+    if not isinstance(mesh.support, RigidSupport):
+        return {}
+    return {UnitKey("misalignment", "um"): float(mesh.support.misalignment.over_face(mesh.pair))}

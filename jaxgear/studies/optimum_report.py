@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import chain, repeat
 from typing import Any
 
@@ -14,10 +14,11 @@ from ..io import DesignFile, describe
 from ..io.results import unit_of
 from ..metrics import Finding, Quantity, flank_surface
 from ..microgeometry import AbstractModification
+from ..numerics import UnitKey
 from ..optimize import Front, Optimum, Problem, Projection
 from ..optimize.result import PENALIZED
 from ..optimize.verdict import over_cases
-from ..report import Table
+from ..report import Figure, Table, text
 from ..vocabulary import quantities
 from . import side_by_side
 from .evaluation import response_surface
@@ -325,35 +326,40 @@ def summary(file: DesignFile, optimum: Optimum, projection: Projection | None) -
     if projection is not None:
         data["projection"] = {
             "curve": projection.curve,
-            "ppte_um": projection.ppte,
-            "loss_um": projection.loss,
-            "misfit_um": projection.misfit,
+            quantities["ppte"].key: projection.ppte,
+            UnitKey("loss", "um"): projection.loss,
+            UnitKey("misfit", "um"): projection.misfit,
             **flanks_data(projection.pinion, projection.wheel),
         }
     return data
 
 
+def checks(optimum: Optimum) -> Iterator[tuple[str, str]]:
+    """How the search ended, by name and text."""
+    yield "all constraints met", text(optimum.feasible)
+    yield "change of the objective at twice the positions, in its unit", text(optimum.grid_change)
+    yield "first-order optimality, in the unit of the objective", text(optimum.optimality)
+    yield "contact analyses", text(optimum.evaluations)
+
+
 def figures(
     mesh: Mesh, torque: float, optimum: Optimum, front: Front | None, evaluations: side_by_side.Evaluations
-) -> dict[str, Any]:
-    """Axes of the search and of the optimum over all loads, by name."""
+) -> Iterator[Figure]:
+    """Figures of the search and of the optimum over all loads."""
     from .. import plot
 
     torques, errors = response_surface(mesh, torque, optimum.pinion, optimum.wheel)
     unloaded, name = optimum.cycle.unloaded_transmission_error, side_by_side.main_name(evaluations)
-    axes: dict[str, Any] = {
-        "response_surface": plot.response_surface(
-            mesh.phase, torques, errors, unloaded, design_torque=float(optimum.cycle.torque), design=name
-        ),
-    }
+    about = {"design_torque": float(optimum.cycle.torque), "design": name}
+    yield Figure.of(plot.response_surface, mesh.phase, torques, errors, unloaded, **about)
     if front is None:  # the compromise of a front is measured by the front so far, which moves
-        axes["convergence"] = plot.convergence({optimum.method: optimum})
+        yield Figure.of(plot.convergence, {optimum.method: optimum})
+    else:
+        others = others_of(front, evaluations)
+        yield replace(Figure.of(plot.optimum_front, front, chosen=front.chosen, others=others), name="front")
     if optimum.iterations:
-        axes["iterations_relief"] = plot.iterations_relief(mesh, optimum)
-        axes["iterations_transmission_error"] = plot.iterations_transmission_error(optimum, mesh.phase)
-    if front is not None:
-        axes["front"] = plot.optimum_front(front, chosen=front.chosen, others=others_of(front, evaluations))
-    return axes
+        yield Figure.of(plot.iterations_relief, mesh, optimum)
+        yield Figure.of(plot.iterations_transmission_error, optimum, mesh.phase)
 
 
 def _feasibility(optimum: Optimum) -> Iterator[tuple[str, str]]:
@@ -398,6 +404,6 @@ def _positions(optimum: Optimum, evaluations: side_by_side.Evaluations, searched
     yield from others
 
 
-def _with_unit(file: DesignFile, name: str) -> str:
+def _with_unit(file: DesignFile, name: str) -> UnitKey:
     unit = file.units.get(name, "")
-    return f"{name}_{unit}" if unit and not name.endswith(f"_{unit}") else name
+    return UnitKey(name.removesuffix(f"_{unit}") if unit else name, unit)

@@ -66,3 +66,13 @@ def _options(part: eqx.Module) -> dict[str, Any]:
 def finding_data(finding: Finding) -> dict[str, Any]:
     """A finding by name, place, value and what is usual."""
     return {"name": finding.key, "where": finding.where, "value": finding.value, **finding.usual._asdict()}
+
+
+def without_none(settings: eqx.Module) -> dict[str, Any]:
+    """Fields of settings, and of settings within them, that are not None."""
+    given = {field.name: getattr(settings, field.name) for field in dataclasses.fields(settings)}
+    return {
+        name: without_none(value) if isinstance(value, eqx.Module) else value
+        for name, value in given.items()
+        if value is not None
+    }
