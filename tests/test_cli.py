@@ -35,10 +35,10 @@ from jaxgear.metrics import Finding
 from jaxgear.microgeometry import NoModification
 from jaxgear.numerics import Usual
 from jaxgear.optimize import result as optimum_result
-from jaxgear.studies import evaluation, gear_data, manufactured, optimum_report, side_by_side
+from jaxgear.studies import ComparisonResult, evaluation, gear_data, manufactured, optimization_result, side_by_side
 from jaxgear.studies.analysis import ComparisonRun
 from jaxgear.studies.gear_data import gears
-from jaxgear.studies.optimum_report import front_rows, front_table, gains
+from jaxgear.studies.optimization_result import OptimizationResult, front_rows, front_table, gains
 from jaxgear.tolerance import ToleranceClass, iso_rounded
 from jaxgear.vocabulary import quantities
 
@@ -425,14 +425,16 @@ def test_a_front_is_tabulated_drawn_and_compared(monkeypatch):
     designs = {name: SimpleNamespace(objectives=dict(zip("ab", of))) for name, of in both.items()}
     # the picture has the designs that are no part of the front
     for owner, name, found in (
-        (optimum_report, "response_surface", (None, None)),
+        (optimization_result, "response_surface", (None, None)),
         (plot, "response_surface", None),
     ):
         monkeypatch.setattr(owner, name, plot.figure.captioned("")(lambda *given, found=found, **options: found))
     monkeypatch.setattr(plot, "optimum_front", plot.figure.captioned("")(lambda front, **options: options))
     cycle = SimpleNamespace(unloaded_transmission_error=None, torque=1.0)
     optimum = SimpleNamespace(cycle=cycle, pinion=None, wheel=None, iterations=())
-    _, figure = optimum_report.figures(SimpleNamespace(phase=None), 1.0, optimum, front, designs)
+    monkeypatch.setattr(ComparisonResult, "figures", lambda result: iter(()))
+    of = SimpleNamespace(torque=1.0), False, SimpleNamespace(phase=None), None, designs, {}, ""
+    _, figure = OptimizationResult(*of, optimum, front, None, 0).figures()
     drawn = figure.axes
     assert figure.name == "front"
     assert drawn["chosen"] == 1 and {name: [*point] for name, point in drawn["others"].items()} == {

@@ -22,7 +22,7 @@ from jaxgear import plot, report
 from jaxgear.cli import document
 from jaxgear.io import load_design
 from jaxgear.numerics import UnitKey
-from jaxgear.studies import AbstractStudyResult
+from jaxgear.studies import AbstractStudyResult, AnalysisStudy
 from jaxgear.sweeps.columns import FLAG, NUMBER, Column, described
 from jaxgear.sweeps.table import in_memory
 from jaxgear.vocabulary import quantities
@@ -54,7 +54,7 @@ def without(monkeypatch):
 def written(path: Path, **parts) -> Page:
     """A page with one section."""
     section = report.Chapter("Part", **parts)
-    report.write_report(path, report.Report(HOSTILE, HOSTILE, [("name", HOSTILE)], [section]))
+    report.write_report(path, HOSTILE, HOSTILE, [("name", HOSTILE)], [section])
     assert_well_formed(path.read_bytes())
     return Page(path.read_text("utf-8"))
 
@@ -96,7 +96,7 @@ def test_a_table_is_the_one_that_is_printed():
 def test_figures_are_numbered_through_all_sections(tmp_path):
     picture = report.Picture("a", "What it shows.", "data:image/png;base64,AAAA", 100.0)
     sections = [report.Chapter("one", figures=[picture, picture]), report.Chapter("two", figures=[picture])]
-    report.write_report(tmp_path / "page.html", report.Report("t", "s", FACTS, sections))
+    report.write_report(tmp_path / "page.html", "t", "s", FACTS, sections)
     page = (tmp_path / "page.html").read_text("utf-8")
     assert [page.count(f"Figure {number}. What it shows.") for number in range(1, 5)] == [1, 1, 1, 0]
 
@@ -194,15 +194,14 @@ class SomeResult(AbstractStudyResult):
 
 def test_what_nobody_looked_at_is_not_called_usual(tmp_path):
     (tmp_path / "pair.toml").write_text(FIXED)
-    design = load_design(tmp_path / "pair.toml")
-    source = report.Source.of(Path("pair.toml"), b"title = 1\n")
-    asked = document.Document(("analyze", "pair.toml"), source, datetime.datetime.now())
+    study = AnalysisStudy.of(load_design(tmp_path / "pair.toml"))
+    asked = document.Document(("analyze", "pair.toml"), "pair.toml", b"title = 1\n", datetime.datetime.now())
     for findings, said in (((), True), (None, False), (["warning: this"], False)):
-        asked.write(tmp_path, design, SomeResult(findings), {})
+        asked.write(tmp_path, study, SomeResult(findings), {})
         page = (tmp_path / "report.html").read_text("utf-8")
         assert ("within the usual ranges" in page) == said and ("warning: this" in page) == bool(findings)
         assert "no limit is exceeded" in page
-    asked.write(tmp_path, design, SomeResult(None, ["NOT CONVERGED"]), {})
+    asked.write(tmp_path, study, SomeResult(None, ["NOT CONVERGED"]), {})
     page = (tmp_path / "report.html").read_text("utf-8")
     assert "no limit is exceeded" not in page and page.count("NOT CONVERGED") == 2
 
@@ -265,7 +264,7 @@ def test_a_browser_prints_it(tmp_path):
     """Two short sections, one of which begins on a new page, on paper of the size A4."""
     page = tmp_path / "page.html"
     sections = [report.Chapter("a", ["b"]), report.Chapter("c", ["d"], new_page=True)]
-    report.write_report(page, report.Report("title", "sub", FACTS, sections))
+    report.write_report(page, "title", "sub", FACTS, sections)
     paper = tmp_path / "page.pdf"
     options = ("--headless", "--no-sandbox", "--disable-gpu", f"--user-data-dir={tmp_path / 'profile'}")
     command = ("chromium", *options, f"--print-to-pdf={paper}", page.as_uri())

@@ -1,5 +1,6 @@
 """The report of a command, put together from what it prints, writes and draws."""
 
+import hashlib
 import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -10,8 +11,8 @@ from typing import Any
 from ..io import DesignFile
 from ..io.errors import naming
 from ..io.toml import content
-from ..report import Chapter, Report, Source, Table, heading, needed, numbers, picture, write_report
-from ..studies import AbstractStudyResult
+from ..report import Chapter, Table, heading, needed, numbers, picture, write_report
+from ..studies import AbstractStudy, AbstractStudyResult
 from ..studies.gear_data import gear_tables, gears
 from ..studies.summary_data import versions
 
@@ -41,78 +42,57 @@ class Document:
 
     Attributes:
         command: the command line, from its name to the last option.
-        source: the design file as it was when the command began.
-        began: when.
+        name: name of the design file, without its folders.
+        content: content of the design file when the command began.
+        began: time when the command began.
     """
 
-    command: tuple[str, ...]
-    source: Source
+    command: Sequence[str]
+    name: str
+    content: bytes
     began: datetime
 
-    @property
-    def facts(self) -> list[tuple[str, str]]:
-        """Name and text of design file, digest, date and command line, for the head of the report."""
+    def facts(self, design: DesignFile) -> list[tuple[str, str]]:
+        """Names and texts of project, design file, date, command line and versions, for the head of the report."""
+        project = design.tables["project"].fields if "project" in design.tables else {}
         return [
-            ("design file", self.source.name),
-            ("SHA-256", self.source.sha256),
+            *((_PROJECT.get(name, name), text) for name, text in project.items()),
+            ("design file", self.name),
+            ("SHA-256", hashlib.sha256(self.content).hexdigest()),
             ("date", self.began.isoformat(" ", "seconds")),
             ("command", shlex.join(("jaxgear", *self.command))),
+            ("made by", ", ".join(f"{name} {version}" for name, version in versions().items())),
         ]
 
     def write(
-        self,
-        folder: Path,
-        design: DesignFile,
-        result: AbstractStudyResult,
-        captions: Mapping[Path, str],
-        *,
-        quick: bool = False,
-        left_out: str = "",
-        omitted: str = "",
+        self, folder: Path, study: AbstractStudy[Any], result: AbstractStudyResult, captions: Mapping[Path, str]
     ) -> None:
         """Writes the report.
 
         Args:
-            folder: of the results.
-            design: the design file.
-            result: result of the command.
+            folder: folder of the results.
+            study: the study of the command.
+            result: result of the study.
             captions: captions of the figures by file.
-            quick: True for a preview.
-            left_out, omitted: messages naming the parts of the design file that the command ignores, see
-                `AbstractStudy.left_out` and `AbstractStudy.omits`; "" for none.
         """
-        failures, data = list(result.failures()), gears(design)
+        design, failures = study.design, list(result.failures())
         sections = [
             Chapter("Results", list(result.verdict()), failures, tables=[*result.headlines(), *result.tables()]),
             *result.chapters(),
             *([Chapter("Figures", figures=[picture(*each) for each in captions.items()])] if captions else []),
-            _validity(result, failures, quick=quick),
-            _inputs(design, result, left_out, omitted, quick=quick),
-            Chapter("Geometry", [_GEOMETRY_NOTE], tables=gear_tables(data), new_page=True),
+            _validity(study, result, failures),
+            _inputs(study, result),
+            Chapter("Geometry", [_GEOMETRY_NOTE], tables=gear_tables(gears(design)), new_page=True),
             *_all_numbers(result.summary()),
             Chapter(
                 "Design file",
-                [f"{self.source.name} as it was read; the command on the first page repeats the calculation."],
-                literal=self.source.text,
+                [f"{self.name} as it was read; the command on the first page repeats the calculation."],
+                literal=self.content.decode("utf-8-sig", "replace"),
                 new_page=True,
             ),
         ]
-        made_by = "made by", ", ".join(f"{name} {version}" for name, version in versions().items())
-        facts = [*project_facts(design), *self.facts, made_by]
         subtitle = f"jaxgear {self.command[0]}" if self.command else "jaxgear"
-        write_report(folder / REPORT, Report(design.title, subtitle, facts, sections))
-
-
-def asked_for(command: Sequence[str] | None, *libraries: str) -> datetime | None:
-    """Looks whether a report can be written, before long work begins; None where none was asked for.
-
-    Raises:
-        ValueError: when one of the libraries is not installed.
-    """
-    if command is None:
-        return None
-    needed("jinja2", *libraries)
-    return datetime.now().astimezone()
+        write_report(folder / REPORT, design.title, subtitle, self.facts(design), sections)
 
 
 def document(command: Sequence[str] | None, file: Path, *libraries: str) -> Document | None:
@@ -121,27 +101,21 @@ def document(command: Sequence[str] | None, file: Path, *libraries: str) -> Docu
     Raises:
         ValueError: when one of the libraries that it needs is not installed, or the file cannot be read.
     """
-    began = asked_for(command, *libraries)
-    if command is None or began is None:
+    if command is None:
         return None
+    needed("jinja2", *libraries)
     with naming(file):
-        return Document(tuple(command), Source.of(file, content(file)), began)
+        return Document(command, file.name, content(file), datetime.now().astimezone())
 
 
-def project_facts(design: DesignFile) -> list[tuple[str, str]]:
-    """Whose gears these are."""
-    given = design.tables["project"].fields if "project" in design.tables else {}
-    return [(_PROJECT.get(name, name), said) for name, said in given.items()]
-
-
-def _validity(result: AbstractStudyResult, failures: Sequence[str], *, quick: bool) -> Chapter:
+def _validity(study: AbstractStudy[Any], result: AbstractStudyResult, failures: Sequence[str]) -> Chapter:
     """Chapter on convergence, usual ranges and checks of the results."""
     found = result.findings()
     findings = None if found is None else list(found)
     lines = []
     if not failures:
         lines.append("Every solution converged, and no limit is exceeded.")
-    if quick:
+    if study.quick:
         lines.append("Quick run, coarse positions and a short search: a preview, do not use for design.")
     if findings == []:
         lines.append("Inputs and results lie within the usual ranges.")
@@ -150,10 +124,11 @@ def _validity(result: AbstractStudyResult, failures: Sequence[str], *, quick: bo
     return Chapter("Convergence and validity", [*lines, *result.details()], failures, findings or (), tables)
 
 
-def _inputs(design: DesignFile, result: AbstractStudyResult, left_out: str, omitted: str, *, quick: bool) -> Chapter:
+def _inputs(study: AbstractStudy[Any], result: AbstractStudyResult) -> Chapter:
     """Chapter of assumptions and input values."""
+    left_out, omitted, design = study.left_out, study.omits(), study.design
     ignored = "; ".join(filter(None, (left_out, omitted))) or None
-    known = _without_none({**result.inputs(), "quick": quick, "left_out": ignored})
+    known = _without_none({**result.inputs(), "quick": study.quick, "left_out": ignored})
     held = f"{left_out[:1].upper()}{left_out[1:]}." if left_out else _SUPPORTED
     points = [*_ASSUMED, *result.assumptions, *([f"{omitted}."] if omitted else [])]
     points.append(_RIGID if design.support is None else held)

@@ -17,10 +17,9 @@ from ..numerics import compile_quickly
 from ..studies import AbstractStudy, Checkpoints, Progress
 from ..studies.results import save_figures, write_study_summary
 from ..studies.study import AbstractStudyResult
-from ..studies.summary_data import versions
 from . import interrupt, streams, terminal
 from .cache import enable_cache
-from .document import document, project_facts
+from .document import document
 from .progress import Stages
 
 _FIGURES = ("matplotlib.pyplot",)
@@ -74,15 +73,13 @@ def run_study(
                 _without_windows()
             if asked is not None:
                 stages.begin("preparing the report")
-                facts = [*project_facts(design), *asked.facts, *versions().items()]
-                result = result.reported(folder, facts, figures=figures)
+                result = result.reported(folder, asked.facts(design), figures=figures)
             captions = {}
             if figures and type(result).figures is not AbstractStudyResult.figures:
                 stages.begin("drawing the figures")
                 captions = save_figures(folder, result.figures())
             if asked is not None:
-                ignored = {"left_out": study.left_out, "omitted": omitted}
-                asked.write(folder, design, result, captions, quick=study.quick, **ignored)
+                asked.write(folder, study, result, captions)
             write_study_summary(folder, study, result)
             putting_in_place.enter_context(interrupt.held(f"the results are in {target}{os.sep}"))
             putting_in_place.callback(checkpoints.remove)

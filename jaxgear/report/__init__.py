@@ -6,8 +6,6 @@ It shows what it is handed, tables, lines and pictures, and computes nothing. Ne
 from .page import Chapter as Chapter
 from .page import Figure as Figure
 from .page import Picture as Picture
-from .page import Report as Report
-from .page import Source as Source
 from .page import Table as Table
 from .page import heading as heading
 from .page import needed as needed

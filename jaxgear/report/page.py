@@ -1,7 +1,6 @@
 """The report: what it consists of, as plain text, and as an HTML page."""
 
 import base64
-import hashlib
 import struct
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -36,26 +35,6 @@ def needed(*modules: str) -> None:
     for module in modules:
         if find_spec(module) is None:
             raise ValueError(f"--report needs the library {module}: pip install 'jaxgear[report]'")
-
-
-@dataclass(frozen=True)
-class Source:
-    """A design file as it was read.
-
-    Attributes:
-        name: of the file, without its folders.
-        text: what it holds.
-        sha256: hash of its bytes, in hexadecimal digits.
-    """
-
-    name: str
-    text: str
-    sha256: str
-
-    @classmethod
-    def of(cls, path: Path, content: bytes) -> "Source":
-        """The file of a path, from its bytes."""
-        return cls(path.name, content.decode("utf-8-sig", "replace"), hashlib.sha256(content).hexdigest())
 
 
 _LABEL_WIDTH, _CELL_WIDTH = 32, 10  # of a table whose columns must fit [characters]
@@ -167,39 +146,32 @@ class Chapter:
     new_page: bool = False
 
 
-@dataclass(frozen=True)
-class Report:
-    """All of it.
-
-    Attributes:
-        title: of the design.
-        subtitle: what was done.
-        facts: name and text of what identifies the report, above its first section.
-        sections: the parts.
-    """
-
-    title: str
-    subtitle: str
-    facts: Sequence[tuple[str, str]]
-    sections: Sequence[Chapter]
-
-
 _TEMPLATES = Path(__file__).parent / "templates"
 # Between the margins of A4 are 180 mm: letters of a picture of this width [mm] shrink from 9 to 7.7 points, and
 # wider ones lie on their side.
 _UPRIGHT = 210.0
 
 
-def write_report(path: Path, report: Report) -> None:
+def write_report(
+    path: Path, title: str, subtitle: str, facts: Sequence[tuple[str, str]], sections: Sequence[Chapter]
+) -> None:
     """Writes a report as one HTML file that refers to nothing outside of it.
 
     All text is escaped: names and contents of files may hold anything.
+
+    Args:
+        path: file to write.
+        title: title of the design.
+        subtitle: name of the command.
+        facts: names and texts above the first section.
+        sections: chapters in their order.
 
     Raises:
         ValueError: without the library jinja2, or when the file cannot be written.
     """
     needed("jinja2")
-    write_text(path, printable(rendered("report.html", report=report, upright=_UPRIGHT)))
+    parts = {"title": title, "subtitle": subtitle, "facts": facts, "sections": sections}
+    write_text(path, printable(rendered("report.html", **parts, upright=_UPRIGHT)))
 
 
 def write_text(path: Path, text: str) -> None:
