@@ -139,11 +139,11 @@ class WearResult(AbstractStudyResult):
         if depth is not None:  # which goes on behind the last block
             heading = f"revolutions\nto {float(depth):g} um\ndepth"
             shown = partial(_life_text, ended=ended, beyond="never")
-            yield _record("life_to_depth_revolutions", "", lambda of: life_to_depth(of.history, depth), heading, shown)
+            yield _record("life_to_depth", "revolutions", lambda of: life_to_depth(of.history, depth), heading, shown)
         if ppte is not None:  # which is not known behind it
             heading = f"revolutions\nto PPTE of\n{float(ppte):g} um"
             shown = partial(_life_text, ended=ended, beyond=f"> {ended:.3g}")
-            yield _record("life_to_ppte_revolutions", "", lambda of: life_to(of.history, "ppte", ppte), heading, shown)
+            yield _record("life_to_ppte", "revolutions", lambda of: life_to(of.history, "ppte", ppte), heading, shown)
 
     def tables(self) -> Iterator[Table]:
         """The lives of all designs, and their scatter over manufactured pairs where the file has tolerances."""
