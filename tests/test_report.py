@@ -150,10 +150,10 @@ def test_a_name_in_words(key, text, words):
 
 def test_records_are_a_table_and_numbers():
     records = (
-        report.Record(UnitKey("width", "mm"), lambda of: of[0], ""),
-        report.Record(UnitKey("mass", "kg"), lambda of: of[1], "heavy", lambda mass: f"{1000 * mass:g} g"),
-        report.Record(UnitKey("count"), lambda of: len(of)),
-        report.Record(UnitKey("age", "h"), lambda of: None, "age"),
+        report.Record("width", "mm", lambda of: of[0], ""),
+        report.Record("mass", "kg", lambda of: of[1], "heavy", lambda mass: f"{1000 * mass:g} g"),
+        report.Record("count", "", lambda of: len(of)),
+        report.Record("age", "h", lambda of: None, "age"),
     )
     rows = {"a": (1.0, 2.0), "b": (3.0, 4.0)}
     assert report.numbers_of(records, rows["a"]) == {"width_mm": 1.0, "mass_kg": 2.0, "count": 2}

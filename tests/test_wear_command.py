@@ -154,7 +154,8 @@ def test_the_figures_of_worn_flanks_show_every_design(monkeypatch):
     }
     settings = SimpleNamespace(dynamics=None)
     monkeypatch.setattr(plot, "wear_history", lambda *given: None)
-    drawn = WearResult.figures(SimpleNamespace(histories=lives, settings=settings, scatters={}))
+    figures = WearResult.figures(SimpleNamespace(histories=lives, settings=settings, scatters={}))
+    drawn = {figure.name: figure.axes for figure in figures}
     for gear in ("pinion", "wheel"):
         panels = np.ravel(drawn[f"worn_{gear}"])
         assert [panel.get_title() for panel in panels] == list(lives)

@@ -199,18 +199,19 @@ def _prior(design: DesignFile) -> dict[str, tuple[float, float]]:
 _FIT_CAPTION = "Measured transmission error with the standard deviation of its noise, and that of the flanks found."
 _PITCH_CAPTION = "Single pitch deviations of both gears as identified, with their standard deviations."
 _UNKNOWN: tuple[Record[tuple[Any, ...]], ...] = (
-    Record(UnitKey("unit"), itemgetter(0), "", "s"),
-    Record(UnitKey("estimate"), itemgetter(1), "", ".4g"),
-    Record(UnitKey("standard_deviation"), itemgetter(2), "standard\ndeviation", ".4g"),
-    Record(UnitKey("prior_mean"), itemgetter(3), "prior\nmean", ".4g"),
-    Record(UnitKey("prior_standard_deviation"), itemgetter(4), "prior\ndeviation", ".4g"),
+    Record("unit", "", itemgetter(0), "", "s"),
+    Record("estimate", "", itemgetter(1), "", ".4g"),
+    Record("standard_deviation", "", itemgetter(2), "standard\ndeviation", ".4g"),
+    Record("prior_mean", "", itemgetter(3), "prior\nmean", ".4g"),
+    Record("prior_standard_deviation", "", itemgetter(4), "prior\ndeviation", ".4g"),
 )
 # of the single pitch deviations of a gear and their standard deviations
 _PITCH: tuple[Record[tuple[Any, Any]], ...] = (
-    Record(UnitKey("largest"), lambda of: np.abs(of[0]).max(), "largest single\npitch deviation", ".3g"),
-    Record(UnitKey("total"), lambda of: np.ptp(np.cumsum(of[0])), "total cumulative\npitch deviation", ".3g"),
+    Record("largest", "", lambda of: np.abs(of[0]).max(), "largest single\npitch deviation", ".3g"),
+    Record("total", "", lambda of: np.ptp(np.cumsum(of[0])), "total cumulative\npitch deviation", ".3g"),
     Record(
-        UnitKey("deviation"),
+        "deviation",
+        "",
         lambda of: np.sqrt(np.mean(np.square(of[1]))),
         "standard deviation\nof a single one",
         ".3g",

@@ -111,26 +111,28 @@ class DynamicsResult(AbstractStudyResult):
             return lambda run: peak(run[-1], field)[place]
 
         return (
-            Record(UnitKey("torque", "N m"), lambda run: run[1], "", "g"),
+            Record("torque", "N m", lambda run: run[1], "", "g"),
             Record(
-                UnitKey("natural_frequency", "Hz"),
+                "natural_frequency",
+                "Hz",
                 lambda run: self.natural_frequencies[run[0]][run[1]],
                 "f_n [Hz]",
                 ".0f",
             ),
-            Record(UnitKey("speed"), lambda run: run[2], "", "s"),
-            Record(UnitKey("max_dynamic_factor"), top("dynamic_factor", 0), "K_v"),
-            Record(UnitKey("at_dynamic_factor", "Hz"), top("dynamic_factor", 1), "at [Hz]", ".0f"),
-            Record(UnitKey("max_dte_rms", "um"), top("dte_rms", 0), "DTE rms [um]", ".2f"),
-            Record(UnitKey("at_dte_rms", "Hz"), top("dte_rms", 1), "at [Hz]", ".0f"),
+            Record("speed", "", lambda run: run[2], "", "s"),
+            Record("max_dynamic_factor", "", top("dynamic_factor", 0), "K_v"),
+            Record("at_dynamic_factor", "Hz", top("dynamic_factor", 1), "at [Hz]", ".0f"),
+            Record("max_dte_rms", "um", top("dte_rms", 0), "DTE rms [um]", ".2f"),
+            Record("at_dte_rms", "Hz", top("dte_rms", 1), "at [Hz]", ".0f"),
             Record(
-                UnitKey("max_no_contact_share"),
+                "max_no_contact_share",
+                "",
                 top("contact_loss_share", 0),
                 "contact loss [%]",
                 lambda share: f"{100 * share:.1f}",
             ),
-            Record(UnitKey("max_coast_contact_share"), top("back_side_contact", 0)),
-            Record(UnitKey("speeds_without_period"), lambda run: int(np.sum(np.asarray(run[-1].period) == 0))),
+            Record("max_coast_contact_share", "", top("back_side_contact", 0)),
+            Record("speeds_without_period", "", lambda run: int(np.sum(np.asarray(run[-1].period) == 0))),
         )
 
     def tables(self) -> Iterator[Table]:

@@ -247,7 +247,7 @@ class LayoutResult(AbstractStudyResult):
         wears = bool(self.main.damage)
         groups = [
             [
-                Record(UnitKey("torque"), lambda of: float(of.torque), "torque of the layout [N m]", "g"),
+                Record("torque", "", lambda of: of.torque, "torque of the layout [N m]", "g"),
                 *_factors("{} without modification", 0),
             ],
             [
@@ -407,7 +407,7 @@ def _reactions(support: ShaftSupport) -> dict[str, Any]:
 
 
 def _record(heading: str, of: Callable[[FlankLineLayout], Any], form: str = ".3f") -> Record[FlankLineLayout]:
-    return Record(UnitKey(heading), lambda layout: float(of(layout)), heading, form)
+    return Record(heading, "", of, heading, form)
 
 
 def _factors(heading: str, step: int) -> Iterator[Record[FlankLineLayout]]:
@@ -424,7 +424,7 @@ def _cases(name: str, tolerance: FlankLineTolerance, *, lives: bool) -> Iterator
     """K_Hbeta after every step in the cases of deviations within a tolerance, with K_Fbeta and life of the worst."""
 
     def record(heading: str, each: Callable[[FlankLineLayout], Iterable[str]]) -> Record[FlankLineLayout]:
-        return Record(UnitKey(heading), lambda of: " / ".join(each(of)), heading, "s")
+        return Record(heading, "", lambda of: " / ".join(each(of)), heading, "s")
 
     def factor(number: int) -> Callable[[FlankLineLayout], Iterable[str]]:
         return lambda of: (_cell(step[name], number) for step in of.cases)

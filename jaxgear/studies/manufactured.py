@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,6 @@ import numpy as np
 from ..contact import Mesh
 from ..io import DesignFile
 from ..io.tolerance_table import manufactured_of
-from ..numerics import UnitKey
 from ..report import Chapter, Figure, Record, numbers_of, table_of
 from ..sweeps import Scatter, monte_carlo
 from ..tolerance import ManufacturedGears
@@ -49,12 +49,12 @@ def failures(evaluations: Evaluations) -> Iterator[str]:
 
 
 _RECORDS: tuple[Record[Scatter], ...] = (
-    Record(UnitKey("nominal_ppte", "um", "without deviations"), lambda of: float(of.nominal_ppte), ""),
-    Record(UnitKey("mean_ppte", "um", "mean"), lambda of: float(of.mean), ""),
-    Record(UnitKey("std_ppte", "um", "standard deviation"), lambda of: float(of.std), ""),
-    Record(UnitKey("q95_ppte", "um", "95 % quantile"), lambda of: float(of.ppte_quantile95), ""),
-    Record(UnitKey("failed"), lambda of: of.failed, "failed pairs", "d"),
-    Record(UnitKey("pairs"), lambda of: of.ppte.shape[0]),
+    Record("nominal_ppte", "um", attrgetter("nominal_ppte"), "without deviations [um]"),
+    Record("mean_ppte", "um", attrgetter("mean"), "mean [um]"),
+    Record("std_ppte", "um", attrgetter("std"), "standard deviation [um]"),
+    Record("q95_ppte", "um", attrgetter("ppte_quantile95"), "95 % quantile [um]"),
+    Record("failed", "", attrgetter("failed"), "failed pairs", "d"),
+    Record("pairs", "", lambda of: of.ppte.shape[0]),
 )
 
 

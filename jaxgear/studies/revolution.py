@@ -83,7 +83,7 @@ _HEADINGS = {
     "max_revolution_pressure": "pressure\n[MPa]",
 }
 _RECORDS: list[Record[Revolution]] = [
-    Record(of.key, partial(_number, of.name), _HEADINGS.get(of.name), ".0f" if of.unit == "MPa" else ".3f")
+    Record(of.name, of.unit, partial(_number, of.name), _HEADINGS.get(of.name), ".0f" if of.unit == "MPa" else ".3f")
     for of in map(quantity_of, (*_HEADINGS, *(name for name in OF_REVOLUTION if name not in _HEADINGS)))
 ]
 

@@ -1,6 +1,6 @@
 """Result of a wear study: tables, text, figures and files."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -68,16 +68,6 @@ class _Life(NamedTuple):
     factors: np.ndarray
 
 
-def _record(
-    name: str,
-    unit: str,
-    of: Callable[[_Life], Any],
-    heading: str | None = None,
-    form: str | Callable[[float], str] = ".3f",
-) -> Record[_Life]:
-    return Record(UnitKey(name, unit), lambda life: float(of(life)), heading, form)
-
-
 @dataclass(frozen=True)
 class WearResult(AbstractStudyResult):
     """Wear histories of all designs.
@@ -118,32 +108,32 @@ class WearResult(AbstractStudyResult):
         settings = self.settings
         ended, depth, ppte = float(settings.revolutions), settings.depth_limit, settings.ppte_limit
         tiny = np.finfo(float).tiny
-        yield _record("pinion_wear_depth", "um", lambda of: wear_depth(of.history, "pinion")[-1], "depth\npinion\n[um]")
-        yield _record("wheel_wear_depth", "um", lambda of: wear_depth(of.history, "wheel")[-1], "depth\nwheel\n[um]")
-        yield _record("wear_depth_error", "um", lambda of: of.history.error[-1], "its\nerror\n[um]")
-        yield _record("new_ppte", "um", lambda of: of.ppte[0], "PPTE\nnew\n[um]")
-        yield _record("max_ppte_over_life", "um", lambda of: of.ppte.max(), "PPTE\nworst\n[um]")
-        yield _record("worn_ppte", "um", lambda of: of.ppte[-1], "PPTE\nworn\n[um]")
-        yield _record("mean_ppte_over_life", "um", lambda of: mean_over_life(of.history, "ppte"), "PPTE\nmean\n[um]")
-        yield _record("pinion_worn_volume_per_flank", "mm3", lambda of: of.volume[0].sum())
-        yield _record("wheel_worn_volume_per_flank", "mm3", lambda of: of.volume[1].sum())
-        yield _record("volume_by_tip_corners_share", "", lambda of: of.volume[:, 1].sum() / max(of.volume.sum(), tiny))
+        yield Record("pinion_wear_depth", "um", lambda of: wear_depth(of.history, "pinion")[-1], "depth\npinion\n[um]")
+        yield Record("wheel_wear_depth", "um", lambda of: wear_depth(of.history, "wheel")[-1], "depth\nwheel\n[um]")
+        yield Record("wear_depth_error", "um", lambda of: of.history.error[-1], "its\nerror\n[um]")
+        yield Record("new_ppte", "um", lambda of: of.ppte[0], "PPTE\nnew\n[um]")
+        yield Record("max_ppte_over_life", "um", lambda of: of.ppte.max(), "PPTE\nworst\n[um]")
+        yield Record("worn_ppte", "um", lambda of: of.ppte[-1], "PPTE\nworn\n[um]")
+        yield Record("mean_ppte_over_life", "um", lambda of: mean_over_life(of.history, "ppte"), "PPTE\nmean\n[um]")
+        yield Record("pinion_worn_volume_per_flank", "mm3", lambda of: of.volume[0].sum())
+        yield Record("wheel_worn_volume_per_flank", "mm3", lambda of: of.volume[1].sum())
+        yield Record("volume_by_tip_corners_share", "", lambda of: of.volume[:, 1].sum() / max(of.volume.sum(), tiny))
         for name in ("max_pressure_over_life", "max_pressure_over_life_error"):
-            yield _record(name, "MPa", partial(_pressure, name, settings))
-        yield _record("worn_flank_pressure", "MPa", lambda of: over_life(of.history, "max_flank_pressure")[-1])
-        yield _record("worn_flank_pressure_error", "MPa", lambda of: pressure_error(of.history)[-1])
+            yield Record(name, "MPa", partial(_pressure, name, settings))
+        yield Record("worn_flank_pressure", "MPa", lambda of: over_life(of.history, "max_flank_pressure")[-1])
+        yield Record("worn_flank_pressure_error", "MPa", lambda of: pressure_error(of.history)[-1])
         if settings.dynamics is not None:
-            yield _record("new_dynamic_factor", "", lambda of: of.factors[0], "K_v new")
-            yield _record("worn_dynamic_factor", "", lambda of: of.factors[-1])
-            yield _record("max_dynamic_factor_over_life", "", lambda of: of.factors.max(), "K_v worst")
+            yield Record("new_dynamic_factor", "", lambda of: of.factors[0], "K_v new")
+            yield Record("worn_dynamic_factor", "", lambda of: of.factors[-1])
+            yield Record("max_dynamic_factor_over_life", "", lambda of: of.factors.max(), "K_v worst")
         if depth is not None:  # which goes on behind the last block
             heading = f"revolutions\nto {float(depth):g} um\ndepth"
             shown = partial(_life_text, ended=ended, beyond="never")
-            yield _record("life_to_depth", "revolutions", lambda of: life_to_depth(of.history, depth), heading, shown)
+            yield Record("life_to_depth", "revolutions", lambda of: life_to_depth(of.history, depth), heading, shown)
         if ppte is not None:  # which is not known behind it
             heading = f"revolutions\nto PPTE of\n{float(ppte):g} um"
             shown = partial(_life_text, ended=ended, beyond=f"> {ended:.3g}")
-            yield _record("life_to_ppte", "revolutions", lambda of: life_to(of.history, "ppte", ppte), heading, shown)
+            yield Record("life_to_ppte", "revolutions", lambda of: life_to(of.history, "ppte", ppte), heading, shown)
 
     def tables(self) -> Iterator[Table]:
         """The lives of all designs, and their scatter over manufactured pairs where the file has tolerances."""

@@ -105,14 +105,14 @@ def tables(design: DesignFile, settings: Wear, scatters: Mapping[str, Samples]) 
 
 def _records(settings: Wear) -> Iterator[Record[Samples]]:
     for name, heading in ((_PPTE, "mean PPTE\n[um]"), (_DEPTH, "depth\n[um]")):
-        yield Record(UnitKey(name), partial(_mean, name=name), heading)
-        yield Record(UnitKey(name), partial(_bound, name=name), "95 %\nbelow")
+        yield Record(name, "", partial(_mean, name=name), heading)
+        yield Record(name, "", partial(_bound, name=name), "95 %\nbelow")
     limits = {"life_to_depth": "95 % last,\n{:g} um deep", "life_to_ppte": "95 % last,\nPPTE {:g} um"}
     for name in asked(settings)[2:]:
         heading = limits[name].format(float(getattr(settings, _LIVES[name][0])))
         shown = partial(_life_text, settings, name)
-        yield Record(UnitKey(name), partial(_lasts, name=name, share=_LEVEL), heading, shown)
-    yield Record(UnitKey("failed"), failed, "failed", "d")
+        yield Record(name, "", partial(_lasts, name=name, share=_LEVEL), heading, shown)
+    yield Record("failed", "", failed, "failed", "d")
 
 
 def lines(design: DesignFile, scatters: Mapping[str, Samples]) -> Iterator[str]:
