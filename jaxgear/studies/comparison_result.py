@@ -1,19 +1,17 @@
 """Result of a comparison of designs: tables, text, figures and files."""
 
-import dataclasses
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import equinox as eqx
 import numpy as np
 
 from ..contact import Mesh
 from ..geometry import Gear
 from ..io import DesignFile, write_flanks
 from ..metrics import Finding
-from ..numerics import Number, UnitKey, fields_of
+from ..numerics import UnitKey, fields_of
 from ..optimize import Verified
 from ..report import Chapter, Figure, Table, numbers, text
 from ..shafts import RigidSupport
@@ -22,7 +20,7 @@ from . import manufactured, side_by_side
 from .evaluation import Evaluation
 from .gear_data import FACTORS, gears, mounting, rating_page
 from .study import AbstractStudyResult
-from .summary_data import finding_data, flanks_data, model, sizes
+from .summary_data import fields_data, finding_data, flanks_data, key_of, model, sizes
 
 
 @dataclass(frozen=True)
@@ -56,7 +54,7 @@ class ComparisonResult(AbstractStudyResult):
             UnitKey("torque_range", "N m"): file.torque_range,
             UnitKey("speed", "rpm"): file.speed,
             "friction": file.friction,
-            **{name: _fields(part) for name, part in tables.items()},
+            **{name: fields_data(part, units=True) for name, part in tables.items()},
             **manufactured.tolerances(file),
             "model": model(self.mesh),
             "resolution": sizes(self.mesh.resolution),
@@ -168,7 +166,7 @@ def _gear(gear: Gear, geometry: Mapping[str, Any]) -> dict[str, Any]:
     data: dict[str, Any] = {"bore_given": gear.bore_diameter is not None}
     for part in (gear, gear.material):
         for name, field in fields_of(type(part)).items():
-            key = _key(name, field)
+            key = key_of(name, field)
             data[key] = geometry[key] if name in _DERIVED else np.asarray(getattr(part, name))
     return data
 
@@ -181,17 +179,6 @@ def _drawn(given: Mapping[str, Any]) -> dict[str, Any]:
         else key: value
         for key, value in given.items()
     }
-
-
-def _fields(part: eqx.Module) -> dict[str, Any]:
-    """Numbers and choices that a part has, by name and unit."""
-    given = {field.name: getattr(part, field.name) for field in dataclasses.fields(part)}
-    fields = fields_of(type(part))
-    return {_key(name, fields.get(name)): value for name, value in given.items() if value is not None}
-
-
-def _key(name: str, field: Number | None) -> UnitKey:
-    return UnitKey(name, "" if field is None or field.unit == "x module" else field.unit)
 
 
 def _misalignment(mesh: Mesh) -> dict[str, float]:

@@ -20,7 +20,7 @@ from ..numerics import UnitKey
 from ..report import Figure, Record, Table, numbers_of, table_of
 from .evaluation import grid_lines
 from .study import AbstractStudyResult
-from .summary_data import flanks_data, model, without_none
+from .summary_data import fields_data, flanks_data, model
 
 _COLUMNS = {
     "dynamic_factor": "dynamic_factor",
@@ -219,7 +219,7 @@ class DynamicsResult(AbstractStudyResult):
 
     def inputs(self) -> dict[str, Any]:
         """Torques, speeds, settings, equivalent mass and model."""
-        given = without_none(self.settings)
+        given = fields_data(self.settings)
         frequencies = np.asarray(given.pop("mesh_frequencies"))
         return {
             UnitKey("torques", "N m"): self.torques,

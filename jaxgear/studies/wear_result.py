@@ -30,7 +30,7 @@ from ..wear import (
 from ..wear.quantities import blocks_are_short, number_of
 from . import manufactured, wear_scatter
 from .study import AbstractStudyResult
-from .summary_data import flanks_data, without_none
+from .summary_data import fields_data, flanks_data
 
 _QUANTITIES = (
     "ppte",
@@ -216,7 +216,7 @@ class WearResult(AbstractStudyResult):
         settings = self.settings
         return {
             UnitKey("torque", "N m"): self.design.torque,
-            "settings": without_none(replace(settings, largest_increment=None)),
+            "settings": fields_data(replace(settings, largest_increment=None)),
             **({} if settings.loads is None else {"shares_of_revolutions": self._shares()}),
             UnitKey("largest_increment", "um"): settings.largest_increment,
             **(manufactured.tolerances(self.design) if self.scatters else {}),
