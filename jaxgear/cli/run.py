@@ -69,13 +69,14 @@ def run_study(
                 interrupt.note(f"all tables are complete in {target}{os.sep}, not all figures are drawn")
             failures = list(result.failures())
             _show(result, stages)
+            figures = figures and type(result).figures is not AbstractStudyResult.figures
             if figures:
                 _without_windows()
             if asked is not None:
                 stages.begin("preparing the report")
                 result = result.reported(folder, asked.facts(design), figures=figures)
             captions = {}
-            if figures and type(result).figures is not AbstractStudyResult.figures:
+            if figures:
                 stages.begin("drawing the figures")
                 captions = save_figures(folder, result.figures())
             if asked is not None:
