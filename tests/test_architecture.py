@@ -5,6 +5,7 @@ import functools
 import importlib
 import importlib.metadata
 import inspect
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -226,6 +227,14 @@ def typed_files():
     for path in FILES:
         if layer(path) in ORDER:
             yield path.relative_to(PACKAGE).as_posix(), tree_of(path).body
+
+
+def test_files_of_results_are_named_where_they_are_made():
+    above = ("report", "cli")
+    for path in FILES:
+        if layer(path) in above or path.name == "folder.py":
+            texts = [node.value for node in nodes(path)[0] if isinstance(node, ast.Constant)]
+            assert not [text for text in texts if re.fullmatch(r"[a-z_]+\.(png|csv|parquet)", str(text))]
 
 
 def test_public_signatures_are_typed():

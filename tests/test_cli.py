@@ -28,25 +28,26 @@ import jaxgear as jg
 from jaxgear import plot
 from jaxgear.cli import cache, main, run
 from jaxgear.contact.status import Status
-from jaxgear.dynamics.mesh_tables import FILES
 from jaxgear.io import Search, first_look, load_design
-from jaxgear.io.folder import RESULT_FILES, result_folder
+from jaxgear.io.folder import result_folder
 from jaxgear.manufacture import over_balls
 from jaxgear.metrics import Finding
 from jaxgear.microgeometry import NoModification
 from jaxgear.numerics import Usual
 from jaxgear.optimize import result as optimum_result
-from jaxgear.studies import evaluation, gear_data, manufactured, optimum_report, side_by_side
+from jaxgear.studies import ComparisonResult, evaluation, gear_data, manufactured, optimization_result, side_by_side
 from jaxgear.studies.analysis import ComparisonRun
 from jaxgear.studies.gear_data import gears
-from jaxgear.studies.optimum_report import front_rows, front_table, gains
+from jaxgear.studies.optimization_result import OptimizationResult, front_rows, front_table, gains
 from jaxgear.tolerance import ToleranceClass, iso_rounded
 from jaxgear.vocabulary import quantities
 
 pytestmark = pytest.mark.usefixtures("no_cache")
 
 STAGES = "finite-element tables", "searching", "verifying"  # in this order
-EARLIER = '{"versions": {"jaxgear": "0.1.0"}}'  # the summary of an earlier run
+EARLIER = (
+    '{"versions": {"jaxgear": "0.1.0"}, "contents": ["k_chart.png", "summary.json"]}'  # the summary of an earlier run
+)
 PROJECT = """
 [project]
 number = "4711"
@@ -424,14 +425,18 @@ def test_a_front_is_tabulated_drawn_and_compared(monkeypatch):
     designs = {name: SimpleNamespace(objectives=dict(zip("ab", of))) for name, of in both.items()}
     # the picture has the designs that are no part of the front
     for owner, name, found in (
-        (optimum_report, "response_surface", (None, None)),
+        (optimization_result, "response_surface", (None, None)),
         (plot, "response_surface", None),
     ):
-        monkeypatch.setattr(owner, name, lambda *given, found=found, **options: found)
-    monkeypatch.setattr(plot, "optimum_front", lambda front, **options: options)
+        monkeypatch.setattr(owner, name, plot.figure.captioned("")(lambda *given, found=found, **options: found))
+    monkeypatch.setattr(plot, "optimum_front", plot.figure.captioned("")(lambda front, **options: options))
     cycle = SimpleNamespace(unloaded_transmission_error=None, torque=1.0)
     optimum = SimpleNamespace(cycle=cycle, pinion=None, wheel=None, iterations=())
-    drawn = optimum_report.figures(SimpleNamespace(phase=None), 1.0, optimum, front, designs)["front"]
+    monkeypatch.setattr(ComparisonResult, "figures", lambda result: iter(()))
+    of = SimpleNamespace(torque=1.0), False, SimpleNamespace(phase=None), None, designs, {}, ""
+    _, figure = OptimizationResult(*of, optimum, front, None, 0).figures()
+    drawn = figure.axes
+    assert figure.name == "front"
     assert drawn["chosen"] == 1 and {name: [*point] for name, point in drawn["others"].items()} == {
         name: both[name] for name in ("unmodified", "rule-based")
     }
@@ -616,29 +621,21 @@ def test_all_files_of_an_iteration_from_a_relief_of_low_pressure(folder):
     assert result.code == 0 and optimum["method"] == "te_iteration"
     assert optimum["iterations"][0]["max_relief"] > 1.0
     assert "img" in check_report(target, path, *typed).tags
-    of_others = {"ppte_distribution.png"}  # no tolerances
-    of_others |= {"front.csv", "front.png"}
-    # one slice shows nothing over the face
-    of_others |= {"lead_chart.png", "pressure_map.png", "contact_pattern.png", "plane_of_action.png"}
-    of_others |= {"line_load.png", "face_gap.png", "face_load_over_torque.png"}
-    of_others |= {"responses.csv", "dynamic_factor.png", "dte_rms.png", "waterfall.png", "bifurcation.png"}
-    of_others |= {
-        "phase_portrait.png",
-        "branches.png",
-        "order_tracks.png",
-        "run_up.csv",
-        "run_up.png",
-    }  # of `jaxgear dynamics`
-    of_others |= {"profiles.csv", "tolerance_cases.png", "face_load_factors.png", "radar.png"}  # of `jaxgear layout`
-    of_others |= {"shaft_deflection.png", "contact_pattern_unmodified.png", "contact_pattern_layout.png"}
-    of_others |= {"life.csv", "worn_flanks.csv", "worn_flanks.parquet", "worn_pinion.png", "worn_wheel.png"}
-    of_others |= {"ppte_over_life.png", "depth_over_life.png", "dynamic_factor_over_life.png"}  # of `jaxgear wear`
-    of_others |= {"life_ppte_distribution.png"}
-    of_others |= {"revolution.csv", "revolution.png", "orders.csv", "orders.png"}  # of `jaxgear revolution`
-    of_others |= set(FILES)  # of `jaxgear export`
-    of_others |= {f"identified.{end}" for end in ("csv", "toml", "rexs", "png")}
-    of_others |= {"pitch.png", "pitch_pinion.csv", "pitch_wheel.csv"}  # of `jaxgear identify`
-    assert {path.name for path in target.iterdir()} == RESULT_FILES - of_others
+    names = {
+        "transmission_error",
+        "transmission_error_orders",
+        "load_sharing",
+        "pressure",
+        "k_chart",
+        "ppte_over_torque",
+        "harris_map",
+        "response_surface",
+        "convergence",
+        "iterations_relief",
+        "iterations_transmission_error",
+    }
+    expected = {"summary.json", "report.html", "flanks.csv", *(f"{name}.png" for name in names)}
+    assert {path.name for path in target.iterdir()} == expected
     for path in target.glob("*.png"):
         assert path.read_bytes().startswith(b"\x89PNG")
 
@@ -669,8 +666,7 @@ def test_results_of_an_earlier_run_are_replaced_and_figures_are_optional(folder,
     target.mkdir()
     (target / "k_chart.png").write_text("from an earlier run")
     assert_refused(call("analyze", folder / "plain.toml", "-o", target), "other files than results of jaxgear (k_chart")
-    (target / "summary.json").write_text(EARLIER)
-    (target / "summary.json").write_text(EARLIER.replace("}}", '}, "title": "other", "torque_Nm": 70.0}'))
+    (target / "summary.json").write_text(EARLIER.replace("]}", '], "title": "other", "torque_Nm": 70.0}'))
     replaced = call("analyze", folder / "plain.toml", "-o", target, "--no-figures")
     assert replaced.code == 0
     assert f"replaces the results in {target}/ ('other' at 70 N m, 1 figures); --output keeps them" in replaced.err

@@ -17,8 +17,7 @@ from jaxgear.io.write_design import write_starter
 from jaxgear.manufacture import span
 from jaxgear.rexs import read_rexs, write_rexs
 from jaxgear.rexs.frame import frames
-from jaxgear.studies.gear_data import _FACTORS as FACTORS
-from jaxgear.studies.gear_data import gears, mounting, rating_page
+from jaxgear.studies.gear_data import FACTORS, gears, mounting, rating_page
 
 ANGLE = "helix_angle = 15.0"
 OPEN = 'helix_angle = "beta"'

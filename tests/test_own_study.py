@@ -29,7 +29,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from jaxgear.report import Table
+from jaxgear.report import Figure, Table
 from jaxgear.studies import AbstractStudy, AbstractStudyResult, NamedArrays
 
 ASKED = []  # torques that were worked out
@@ -64,7 +64,7 @@ class ShareResult(AbstractStudyResult):
 
         with plot.figure.report_axes(None) as axes:
             axes.plot(list(self.shares), list(self.shares.values()))
-        return {"shares": axes}
+        yield Figure("shares", "Shares of the torque.", axes)
 
 
 @dataclass(frozen=True)
@@ -79,7 +79,6 @@ class ShareStudy(AbstractStudy[ShareResult]):
 
     name: ClassVar = "share"
     coarse: ClassVar = "one torque"
-    files: ClassVar = frozenset({"shares.csv", "shares.png"})
 
     def work_out(self, checkpoints, stages):
         torques = [self.design.torque] if self.quick else [10.0, 20.0, self.design.torque]
@@ -131,12 +130,16 @@ def test_it_is_a_command_with_results_and_report(file, tmp_path, package):
     assert "jaxgear: sharing 20 N m\n" in done.err and not list(tmp_path.glob(".out*"))
     page = check_report(folder, path, "share", path, "-o", folder, "--report")
     assert ["50", "2.632"] in page.rows
+    assert found["contents"] == ["report.html", "shares.csv", "shares.png", "summary.json"]
+    assert "Figure 1. Shares of the torque." in (folder / "report.html").read_text("utf-8")
+    (folder / "notes.txt").touch()
+    assert_refused(call("share", path, "-o", folder), "holds other files than results of jaxgear (notes.txt)")
     assert "Every tooth carries the same." in (folder / "report.html").read_text("utf-8")
 
 
 def test_the_verdict_is_printed_before_figures_are_drawn(file, tmp_path, package, monkeypatch):
     shown = []
-    monkeypatch.setattr(run, "save_figures", lambda *_: shown.append(sys.stdout.getvalue()) or [])
+    monkeypatch.setattr(run, "save_figures", lambda *_: shown.append(sys.stdout.getvalue()) or {})
     done = call("share", file(FIXED), "-o", tmp_path / "out")
     assert done.code == 0 and "largest share: 2.632 N m" in shown[0] and "results in" not in shown[0]
 

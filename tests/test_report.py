@@ -1,13 +1,14 @@
 """The report: nothing from outside, no text taken for code, and one line where it cannot be written."""
 
 import builtins
+import copy
 import datetime
 import io
+import pickle
 import shutil
 import subprocess
 import sys
 from pathlib import Path
-from types import SimpleNamespace
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -19,7 +20,9 @@ from rich.console import Console
 
 from jaxgear import plot, report
 from jaxgear.cli import document
-from jaxgear.io.folder import RESULT_FILES
+from jaxgear.io import load_design
+from jaxgear.numerics import UnitKey
+from jaxgear.studies import AbstractStudyResult, AnalysisStudy
 from jaxgear.sweeps.columns import FLAG, NUMBER, Column, described
 from jaxgear.sweeps.table import in_memory
 from jaxgear.vocabulary import quantities
@@ -51,14 +54,14 @@ def without(monkeypatch):
 def written(path: Path, **parts) -> Page:
     """A page with one section."""
     section = report.Chapter("Part", **parts)
-    report.write_report(path, report.Report(HOSTILE, HOSTILE, [("name", HOSTILE)], [section]))
+    report.write_report(path, HOSTILE, HOSTILE, [("name", HOSTILE)], [section])
     assert_well_formed(path.read_bytes())
     return Page(path.read_text("utf-8"))
 
 
 def test_text_of_others_is_text_everywhere(tmp_path):
     table = report.Table((HOSTILE, "b"), ((HOSTILE, HOSTILE),), HOSTILE, HOSTILE)
-    picture = report.Figure("a", HOSTILE, "data:image/png;base64,AAAA", 100.0)
+    picture = report.Picture("a", HOSTILE, "data:image/png;base64,AAAA", 100.0)
     texts = {"lines": [HOSTILE], "warnings": [HOSTILE], "points": [HOSTILE]}
     page = written(tmp_path / "page.html", **texts, tables=[table], figures=[picture], literal=f"\n{HOSTILE}")
     assert "script" not in page.tags and page.tags.count("img") == 1
@@ -91,9 +94,9 @@ def test_a_table_is_the_one_that_is_printed():
 
 
 def test_figures_are_numbered_through_all_sections(tmp_path):
-    picture = report.Figure("a", "What it shows.", "data:image/png;base64,AAAA", 100.0)
+    picture = report.Picture("a", "What it shows.", "data:image/png;base64,AAAA", 100.0)
     sections = [report.Chapter("one", figures=[picture, picture]), report.Chapter("two", figures=[picture])]
-    report.write_report(tmp_path / "page.html", report.Report("t", "s", FACTS, sections))
+    report.write_report(tmp_path / "page.html", "t", "s", FACTS, sections)
     page = (tmp_path / "page.html").read_text("utf-8")
     assert [page.count(f"Figure {number}. What it shows.") for number in range(1, 5)] == [1, 1, 1, 0]
 
@@ -106,8 +109,8 @@ def test_a_picture_has_its_own_size_on_paper(tmp_path, width):
     path = tmp_path / "k_chart.png"
     figure.savefig(path, dpi=200)
     plt.close(figure)
-    found = report.figure(path)
-    assert found.width == pytest.approx(width, abs=0.2) and "K-chart" in found.caption
+    found = report.picture(path, "A K-chart.")
+    assert found.width == pytest.approx(width, abs=0.2) and found.caption == "A K-chart."
     page = tmp_path / "page.html"
     written(page, figures=[found])
     assert ('class="wide"' in page.read_text("utf-8")) == (width > 210)
@@ -116,34 +119,55 @@ def test_a_picture_has_its_own_size_on_paper(tmp_path, width):
 def test_a_file_that_is_no_picture_is_refused(tmp_path):
     (tmp_path / "a.png").write_bytes(b"no picture")
     with pytest.raises(ValueError, match="a.png: is not a PNG file"):
-        report.figure(tmp_path / "a.png")
+        report.picture(tmp_path / "a.png", "")
 
 
-def test_every_picture_has_its_caption():
-    names = {Path(name).stem for name in RESULT_FILES if name.endswith(".png")} | {"pareto", "parallel_coordinates"}
-    assert names == set(report.CAPTIONS)
+def test_a_figure_has_the_name_and_the_caption_of_its_function():
+    figure = report.Figure.of(plot.ppte_over_torque, np.array([1.0, 2.0]), {"a": np.array([1.0, 2.0])})
+    assert (figure.name, figure.caption) == ("ppte_over_torque", "PPTE over the torque.")
+    assert figure.figure is figure.axes.figure
+    plt.close(figure.figure)
 
 
 @pytest.mark.parametrize(
-    "name, words",
+    "key, text, words",
     [
-        ("max_flank_pressure_MPa", "max flank pressure [MPa]"),
-        ("max_line_load_N_per_mm", "max line load [N/mm]"),
-        ("thermal_contact_coefficient_N_per_(ms^0.5K)", "thermal contact coefficient [N/(m s^0.5 K)]"),
-        ("viscosity_40_mm2_per_s", "viscosity 40 [mm2/s]"),
-        ("bulk_temperature_degC", "bulk temperature [degC]"),
-        ("loss_power_W", "power loss of the flanks [W]"),
-        ("contact_ratio", "contact ratio"),
-        ("teeth", "teeth"),
+        (UnitKey("face_load", "N/mm"), "face_load_N_per_mm", "face load [N/mm]"),
+        (UnitKey("viscosity_40", "mm2/s"), "viscosity_40_mm2_per_s", "viscosity 40 [mm2/s]"),
+        (UnitKey("torque", "N m"), "torque_Nm", "torque [N m]"),
+        (UnitKey("reduction", "%", "less"), "reduction_percent", "less [%]"),
+        (UnitKey("elasticity_factor", "MPa^0.5"), "elasticity_factor_sqrt_MPa", "elasticity factor [MPa^0.5]"),
+        (UnitKey("teeth"), "teeth", "teeth"),
+        (quantities["loss_power"].key, "loss_power_W", "power loss of the flanks [W]"),
+        ("max_flank_pressure_MPa", "max_flank_pressure_MPa", "max flank pressure [MPa]"),
+        ("pairs_MPa", "pairs_MPa", "pairs MPa"),
     ],
 )
-def test_a_name_in_words(name, words):
-    assert report.heading(name) == words
+def test_a_name_in_words(key, text, words):
+    assert key == text and report.heading(key) == words
+    assert report.heading(copy.deepcopy(key)) == report.heading(pickle.loads(pickle.dumps(key))) == words
+
+
+def test_records_are_a_table_and_numbers():
+    records = (
+        report.Record("width", "mm", lambda of: of[0], ""),
+        report.Record("mass", "kg", lambda of: of[1], "heavy", lambda mass: f"{1000 * mass:g} g"),
+        report.Record("count", "", lambda of: len(of)),
+        report.Record("age", "h", lambda of: None, "age"),
+    )
+    rows = {"a": (1.0, 2.0), "b": (3.0, 4.0)}
+    assert report.numbers_of(records, rows["a"]) == {"width_mm": 1.0, "mass_kg": 2.0, "count": 2}
+    down = report.table_of(records, rows, "title", "of")
+    assert down == report.Table(
+        ("of", "width [mm]", "heavy"), (("a", "1.000", "2000 g"), ("b", "3.000", "4000 g")), "title"
+    )
+    across = report.table_of(records, list(rows.items()), "title", across=True, note="note")
+    assert across.header == ("", "a", "b") and across.rows[0] == ("width [mm]", "1.000", "3.000")
 
 
 def test_numbers_of_nested_data_keep_their_place():
     data = {
-        "a_mm": {"b": 1.23456789, "c": [{"d": True}, {"d": False}]},
+        UnitKey("a", "mm"): {"b": 1.23456789, "c": [{"d": True}, {"d": False}]},
         "e": None,
         "f": np.array([1.0, np.nan]),
         "g": {},
@@ -158,18 +182,26 @@ def test_numbers_of_nested_data_keep_their_place():
     ]
 
 
+class SomeResult(AbstractStudyResult):
+    """A result with these findings and failures."""
+
+    def __init__(self, findings, failures=()):
+        self.findings, self.failures = lambda: findings, lambda: failures
+
+    def summary(self):
+        return {}
+
+
 def test_what_nobody_looked_at_is_not_called_usual(tmp_path):
-    design = SimpleNamespace(title="pair", tables={}, support=None, resolution=lambda: SimpleNamespace(slices=1))
-    source = report.Source.of(Path("pair.toml"), b"title = 1\n")
-    pair = {name: {"teeth": 19} for name in ("pinion", "wheel", "pair")}
-    data = {"versions": {"jaxgear": "1"}, "geometry": pair}
-    asked = document.Document(("analyze", "pair.toml"), source, datetime.datetime.now())
+    (tmp_path / "pair.toml").write_text(FIXED)
+    study = AnalysisStudy.of(load_design(tmp_path / "pair.toml"))
+    asked = document.Document(("analyze", "pair.toml"), "pair.toml", b"title = 1\n", datetime.datetime.now())
     for findings, said in (((), True), (None, False), (["warning: this"], False)):
-        asked.write(tmp_path, design, data, document.CommandResult(["line"], findings=findings))
+        asked.write(tmp_path, study, SomeResult(findings), {})
         page = (tmp_path / "report.html").read_text("utf-8")
         assert ("within the usual ranges" in page) == said and ("warning: this" in page) == bool(findings)
         assert "no limit is exceeded" in page
-    asked.write(tmp_path, design, data, document.CommandResult(["line"], ["NOT CONVERGED"]))
+    asked.write(tmp_path, study, SomeResult(None, ["NOT CONVERGED"]), {})
     page = (tmp_path / "report.html").read_text("utf-8")
     assert "no limit is exceeded" not in page and page.count("NOT CONVERGED") == 2
 
@@ -232,7 +264,7 @@ def test_a_browser_prints_it(tmp_path):
     """Two short sections, one of which begins on a new page, on paper of the size A4."""
     page = tmp_path / "page.html"
     sections = [report.Chapter("a", ["b"]), report.Chapter("c", ["d"], new_page=True)]
-    report.write_report(page, report.Report("title", "sub", FACTS, sections))
+    report.write_report(page, "title", "sub", FACTS, sections)
     paper = tmp_path / "page.pdf"
     options = ("--headless", "--no-sandbox", "--disable-gpu", f"--user-data-dir={tmp_path / 'profile'}")
     command = ("chromium", *options, f"--print-to-pdf={paper}", page.as_uri())

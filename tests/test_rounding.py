@@ -14,7 +14,7 @@ from jaxgear.optimize.problem import Score
 from jaxgear.optimize.refine import refined
 from jaxgear.optimize.result import Rounding
 from jaxgear.optimize.rounding import check_steps, rounded
-from jaxgear.studies.optimum_report import _rounding
+from jaxgear.studies.optimization_result import _rounding
 
 STEPS = {"pinion": 3.0, "wheel": 3.0}
 BOX = {"pinion": (0.0, 20.0), "wheel": (0.0, 20.0)}

@@ -26,6 +26,7 @@ from jaxgear.cli import devices
 from jaxgear.contact.status import Status
 from jaxgear.io import load_design, read_variants
 from jaxgear.metrics.findings import LIMITS
+from jaxgear.plot.figure import captioned
 from jaxgear.studies import evaluation, sweep_result
 from jaxgear.studies.progress import Stages
 from jaxgear.sweeps import SweepTable, evaluate
@@ -136,9 +137,11 @@ def test_pictures_show_every_variant_or_an_even_share(folder, tmp_path, monkeypa
     } < names  # of the best, for the report
     monkeypatch.setattr(sweep_result, "_DRAWN", 20)
     drawn = {}
-    monkeypatch.setattr("jaxgear.plot.pareto", lambda table: drawn.update(table) or plt.subplots()[1])
+    pareto = captioned("")(lambda table: drawn.update(table) or plt.subplots()[1])
+    monkeypatch.setattr("jaxgear.plot.pareto", pareto)
     table = jg.open_sweep(folder / "out" / "table")
-    sweep_result.figures_of(table)
+    for figure in sweep_result.figures_of(table):
+        plt.close(figure.figure)
     front = table.pareto(["ppte_um", "effective_contact_ratio"]).column("ppte_um")
     assert set(drawn[table.find("ppte")]) == {*table.column("ppte_um")[::3], *front}
 

@@ -1,7 +1,8 @@
 """The report of a command, put together from what it prints, writes and draws."""
 
+import hashlib
 import shlex
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
@@ -10,8 +11,10 @@ from typing import Any
 from ..io import DesignFile
 from ..io.errors import naming
 from ..io.toml import content
-from ..report import Chapter, Report, Source, Table, figure, heading, needed, numbers, text, write_report
-from ..studies.gear_data import drawing_table, rating_page
+from ..report import Chapter, Table, heading, needed, numbers, picture, write_report
+from ..studies import AbstractStudy, AbstractStudyResult
+from ..studies.gear_data import gear_tables, gears
+from ..studies.summary_data import versions
 
 REPORT = "report.html"
 _NOTHING = "-"
@@ -31,62 +34,6 @@ _ASSUMED = (
 _RIGID = "In the contact analysis shafts, bearings and housing are rigid."
 _SUPPORTED = "Shafts, bearings and housing are those of the design file."
 _EVEN = "One slice represents the whole face: the load is even over it."
-# what summary.json says of the inputs, before its results
-_INPUTS = (
-    "torque_Nm",
-    "torques_Nm",
-    "torque_range_Nm",
-    "speed_rpm",
-    "friction",
-    "lubricant",
-    "strength",
-    "mesh_frequencies_Hz",
-    "speeds",
-    "settings",
-    "equivalent_mass_kg",
-    "tolerances",
-    "variables",
-    "model",
-    "resolution",
-    "quick",
-    "left_out",
-)
-_OF_OPTIMUM = {
-    "feasible": "all constraints met",
-    "objective_change_at_twice_the_positions": "change of the objective at twice the positions, in its unit",
-    "first_order_optimality": "first-order optimality, in the unit of the objective",
-    "evaluations": "contact analyses",
-}
-_ELSEWHERE = ("title", "design_file", "project", "versions", "geometry", "drawing", "iso_6336")
-
-
-@dataclass(frozen=True)
-class CommandResult:
-    """Output of a command for the terminal and the report.
-
-    Attributes:
-        lines: results in words.
-        warnings: results that did not converge, or limits that are not met.
-        findings: values out of the usual range; None if they were not checked.
-        tables: tables of results.
-        figures: files of the pictures.
-        pages: further chapters of the report.
-        assumptions: assumptions of this command, beside those of every contact analysis.
-        left_out: parts of the design file that the command ignores and why; "" for none.
-        first: tables before all others.
-        details: lines on how the results were found, printed last.
-    """
-
-    lines: Sequence[str]
-    warnings: Sequence[str] = ()
-    findings: Sequence[str] | None = None
-    tables: Sequence[Table] = ()
-    figures: Sequence[Path] = ()
-    pages: Sequence[Chapter] = ()
-    assumptions: Sequence[str] = ()
-    left_out: str = ""
-    first: Sequence[Table] = ()
-    details: Sequence[str] = ()
 
 
 @dataclass(frozen=True)
@@ -95,65 +42,57 @@ class Document:
 
     Attributes:
         command: the command line, from its name to the last option.
-        source: the design file as it was when the command began.
-        began: when.
+        name: name of the design file, without its folders.
+        content: content of the design file when the command began.
+        began: time when the command began.
     """
 
-    command: tuple[str, ...]
-    source: Source
+    command: Sequence[str]
+    name: str
+    content: bytes
     began: datetime
 
-    @property
-    def facts(self) -> list[tuple[str, str]]:
-        """Name and text of design file, digest, date and command line, for the head of the report."""
+    def facts(self, design: DesignFile) -> list[tuple[str, str]]:
+        """Names and texts of project, design file, date, command line and versions, for the head of the report."""
+        project = design.tables["project"].fields if "project" in design.tables else {}
         return [
-            ("design file", self.source.name),
-            ("SHA-256", self.source.sha256),
+            *((_PROJECT.get(name, name), text) for name, text in project.items()),
+            ("design file", self.name),
+            ("SHA-256", hashlib.sha256(self.content).hexdigest()),
             ("date", self.began.isoformat(" ", "seconds")),
             ("command", shlex.join(("jaxgear", *self.command))),
+            ("made by", ", ".join(f"{name} {version}" for name, version in versions().items())),
         ]
 
-    def write(self, folder: Path, design: DesignFile, data: Mapping[str, Any], found: CommandResult) -> None:
+    def write(
+        self, folder: Path, study: AbstractStudy[Any], result: AbstractStudyResult, captions: Mapping[Path, str]
+    ) -> None:
         """Writes the report.
 
         Args:
-            folder: of the results.
-            design: the design file.
-            data: what `summary.json` holds.
-            found: what the command says.
+            folder: folder of the results.
+            study: the study of the command.
+            result: result of the study.
+            captions: captions of the figures by file.
         """
-        versions = ("made by", ", ".join(f"{name} {version}" for name, version in data["versions"].items()))
+        design, failures = study.design, list(result.failures())
         sections = [
-            Chapter("Results", found.lines, found.warnings, tables=[*found.first, *found.tables]),
-            *found.pages,
-            *_figures(found.figures),
-            _validity(found, data),
-            _inputs(design, data, found),
-            *([rating_page(data["iso_6336"])] if "iso_6336" in data else []),
-            Chapter("Geometry", [_GEOMETRY_NOTE], tables=_gears(data), new_page=True),
-            *_all_numbers(data),
+            Chapter("Results", list(result.verdict()), failures, tables=[*result.headlines(), *result.tables()]),
+            *result.chapters(),
+            *([Chapter("Figures", figures=[picture(*each) for each in captions.items()])] if captions else []),
+            _validity(study, result, failures),
+            _inputs(study, result),
+            Chapter("Geometry", [_GEOMETRY_NOTE], tables=gear_tables(gears(design)), new_page=True),
+            *_all_numbers(result.summary()),
             Chapter(
                 "Design file",
-                [f"{self.source.name} as it was read; the command on the first page repeats the calculation."],
-                literal=self.source.text,
+                [f"{self.name} as it was read; the command on the first page repeats the calculation."],
+                literal=self.content.decode("utf-8-sig", "replace"),
                 new_page=True,
             ),
         ]
-        facts = [*project_facts(design), *self.facts, versions]
         subtitle = f"jaxgear {self.command[0]}" if self.command else "jaxgear"
-        write_report(folder / REPORT, Report(design.title, subtitle, facts, sections))
-
-
-def asked_for(command: Sequence[str] | None, *libraries: str) -> datetime | None:
-    """Looks whether a report can be written, before long work begins; None where none was asked for.
-
-    Raises:
-        ValueError: when one of the libraries is not installed.
-    """
-    if command is None:
-        return None
-    needed("jinja2", *libraries)
-    return datetime.now().astimezone()
+        write_report(folder / REPORT, design.title, subtitle, self.facts(design), sections)
 
 
 def document(command: Sequence[str] | None, file: Path, *libraries: str) -> Document | None:
@@ -162,74 +101,48 @@ def document(command: Sequence[str] | None, file: Path, *libraries: str) -> Docu
     Raises:
         ValueError: when one of the libraries that it needs is not installed, or the file cannot be read.
     """
-    began = asked_for(command, *libraries)
-    if command is None or began is None:
+    if command is None:
         return None
+    needed("jinja2", *libraries)
     with naming(file):
-        return Document(tuple(command), Source.of(file, content(file)), began)
+        return Document(command, file.name, content(file), datetime.now().astimezone())
 
 
-def project_facts(design: DesignFile) -> list[tuple[str, str]]:
-    """Whose gears these are."""
-    given = design.tables["project"].fields if "project" in design.tables else {}
-    return [(_PROJECT.get(name, name), said) for name, said in given.items()]
-
-
-def _gears(data: Mapping[str, Any]) -> list[Table]:
-    """Geometry, and what stands on a drawing."""
-    tables = geometry_tables(data["geometry"])
-    return [*tables, drawing_table(data["drawing"])] if "drawing" in data else tables
-
-
-def geometry_tables(geometry: Mapping[str, Mapping[str, Any]]) -> list[Table]:
-    """Both gears side by side, and the pair."""
-    pinion, wheel, pair = (geometry[name] for name in ("pinion", "wheel", "pair"))
-    gears = tuple((heading(name), text(pinion[name]), text(wheel[name])) for name in pinion)
-    both = tuple((heading(name), text(value)) for name, value in pair.items())
-    return [Table(("", "pinion", "wheel"), gears, "gears"), Table(("", "pair"), both, "pair")]
-
-
-def _figures(files: Iterable[Path]) -> list[Chapter]:
-    pictures = [figure(path) for path in files]
-    if not pictures:
-        return []
-    return [Chapter("Figures", figures=pictures)]
-
-
-def _validity(found: CommandResult, data: Mapping[str, Any]) -> Chapter:
+def _validity(study: AbstractStudy[Any], result: AbstractStudyResult, failures: Sequence[str]) -> Chapter:
     """Chapter on convergence, usual ranges and checks of the results."""
+    found = result.findings()
+    findings = None if found is None else list(found)
     lines = []
-    if not found.warnings:
+    if not failures:
         lines.append("Every solution converged, and no limit is exceeded.")
-    if data.get("quick"):
+    if study.quick:
         lines.append("Quick run, coarse positions and a short search: a preview, do not use for design.")
-    if found.findings is not None and not found.findings:
+    if findings == []:
         lines.append("Inputs and results lie within the usual ranges.")
-    lines += found.details
-    checks = []
-    for name, design in data.get("designs", {}).items():
-        checks += [
-            (f"{name}: {heading(key)}", text(design[key]))
-            for key in ("converged", "failed_torques_Nm")
-            if key in design
-        ]
-        checks += [(f"{name}: by finite elements, {key}", value) for key, value in numbers(design.get("verified", {}))]
-    optimum = data.get("optimum", {})
-    checks += [(said, text(optimum[key])) for key, said in _OF_OPTIMUM.items() if key in optimum]
-    tables = [Table(("", "value"), tuple(checks), "checks")] if checks else []
-    return Chapter("Convergence and validity", lines, found.warnings, found.findings or (), tables)
+    checks = tuple(result.checks())
+    tables = [Table(("", "value"), checks, "checks")] if checks else []
+    return Chapter("Convergence and validity", [*lines, *result.details()], failures, findings or (), tables)
 
 
-def _inputs(design: DesignFile, data: Mapping[str, Any], found: CommandResult) -> Chapter:
+def _inputs(study: AbstractStudy[Any], result: AbstractStudyResult) -> Chapter:
     """Chapter of assumptions and input values."""
-    given = {name: data[name] for name in _INPUTS if data.get(name) is not None}
-    if "resolution" in given:  # without what is left to its default
-        given["resolution"] = {name: size for name, size in given["resolution"].items() if size is not None}
-    held = f"{found.left_out[:1].upper()}{found.left_out[1:]}." if found.left_out else _SUPPORTED
-    points = [*_ASSUMED, *found.assumptions, _RIGID if design.support is None else held]
+    left_out, omitted, design = study.left_out, study.omits(), study.design
+    ignored = "; ".join(filter(None, (left_out, omitted))) or None
+    known = _without_none({**result.inputs(), "quick": study.quick, "left_out": ignored})
+    held = f"{left_out[:1].upper()}{left_out[1:]}." if left_out else _SUPPORTED
+    points = [*_ASSUMED, *result.assumptions, *([f"{omitted}."] if omitted else [])]
+    points.append(_RIGID if design.support is None else held)
     if design.resolution().slices == 1:
         points.append(_EVEN)
-    return Chapter("Inputs and assumptions", (), (), points, [Table(("", "value"), tuple(numbers(given)), "inputs")])
+    return Chapter("Inputs and assumptions", (), (), points, [Table(("", "value"), tuple(numbers(known)), "inputs")])
+
+
+def _without_none(data: Mapping[str, Any]) -> dict[str, Any]:
+    return {
+        name: _without_none(value) if isinstance(value, Mapping) else value
+        for name, value in data.items()
+        if value is not None
+    }
 
 
 def _listed(title: str, data: Mapping[str, Any]) -> list[Table]:
@@ -251,16 +164,11 @@ def _split(title: str, data: Mapping[str, Any]) -> list[Table]:
 
 
 def _all_numbers(data: Mapping[str, Any]) -> list[Chapter]:
-    """Chapter of the numbers in `summary.json` that no other chapter shows; empty list without any."""
-    rest = {name: value for name, value in data.items() if name not in (*_INPUTS, *_ELSEWHERE)}
-    tables = []
-    for name, value in rest.items():
+    """Chapter of the results in `summary.json`; empty list without any."""
+    loose = {name: value for name, value in data.items() if not isinstance(value, Mapping)}
+    tables = [Table(("", "value"), tuple(numbers(loose)), "")] if loose else []
+    for name, value in data.items():
         if isinstance(value, Mapping):
             tables += _listed(heading(name), value)
-    loose = {name: value for name, value in rest.items() if not isinstance(value, Mapping)}
-    if loose:
-        tables.insert(0, Table(("", "value"), tuple(numbers(loose)), ""))
-    if not tables:
-        return []
-    section = Chapter("All numbers", ["As in summary.json, which has every digit."], tables=tables, new_page=True)
-    return [section]
+    note = "As in summary.json, which has every digit."
+    return [Chapter("All numbers", [note], tables=tables, new_page=True)] if tables else []

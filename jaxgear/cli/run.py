@@ -14,13 +14,12 @@ import jax
 
 from ..io import DesignFile, load_design, result_folder
 from ..numerics import compile_quickly
-from ..studies import AbstractStudy, Checkpoints, Progress, write_results
-from ..studies.results import save_figures
+from ..studies import AbstractStudy, Checkpoints, Progress
+from ..studies.results import save_figures, write_study_summary
 from ..studies.study import AbstractStudyResult
-from ..studies.summary_data import versions
 from . import interrupt, streams, terminal
 from .cache import enable_cache
-from .document import CommandResult, document, project_facts
+from .document import document
 from .progress import Stages
 
 _FIGURES = ("matplotlib.pyplot",)
@@ -63,35 +62,35 @@ def run_study(
             result = study.run(checkpoints=checkpoints, callback=partial(_told, study, target, stages))
             if jax.process_index() > 0:  # the first process speaks for all
                 return not list(result.failures())
-            figures = figures and type(result).figures is not AbstractStudyResult.figures
             stages.begin("writing the results")
-            data, _ = write_results(folder, study, result, figures=False)
+            result.write(folder)
             if study.grows:
+                write_study_summary(folder, study, result)
                 interrupt.note(f"all tables are complete in {target}{os.sep}, not all figures are drawn")
-            found = _found(study, result, omitted)
-            _show(found, stages)
+            failures = list(result.failures())
+            _show(result, stages)
+            figures = figures and type(result).figures is not AbstractStudyResult.figures
             if figures:
                 _without_windows()
             if asked is not None:
                 stages.begin("preparing the report")
-                facts = [*project_facts(design), *asked.facts, *versions().items()]
-                result = result.reported(folder, facts, figures=figures)
-            files = []
+                result = result.reported(folder, asked.facts(design), figures=figures)
+            captions = {}
             if figures:
                 stages.begin("drawing the figures")
-                files = save_figures(folder, result.figures())
+                captions = save_figures(folder, result.figures())
             if asked is not None:
-                shown = dataclasses.replace(_found(study, result, omitted), figures=files)
-                asked.write(folder, design, data, shown)
+                asked.write(folder, study, result, captions)
+            write_study_summary(folder, study, result)
             putting_in_place.enter_context(interrupt.held(f"the results are in {target}{os.sep}"))
             putting_in_place.callback(checkpoints.remove)
     if study.quick and study.coarse:
         terminal.say(f"quick run, {study.coarse}: a preview, do not use for design")
     terminal.say(f"results in {target}{os.sep}, {stages.elapsed:.1f} s")
-    for line in (study.left_out, omitted, *found.warnings):
+    for line in (study.left_out, omitted, *failures):
         if line:
             terminal.warn(line)
-    return not found.warnings
+    return not failures
 
 
 @contextmanager
@@ -100,7 +99,7 @@ def _folder(study: AbstractStudy[Any], target: Path, stages: Stages) -> Iterator
     if study.grows:
         yield target
         return
-    with result_folder(target, study.files) as folder:
+    with result_folder(target) as folder:
         stages.replaces(target)
         yield folder
 
@@ -113,30 +112,17 @@ def _told(study: AbstractStudy[Any], target: Path, stages: Stages, progress: Pro
     stages.shown(progress)
 
 
-def _found(study: AbstractStudy[Any], result: AbstractStudyResult, omitted: str) -> CommandResult:
-    findings = result.findings()
-    return CommandResult(
-        lines=list(result.verdict()),
-        warnings=list(result.failures()),
-        findings=None if findings is None else list(findings),
-        tables=list(result.tables()),
-        pages=result.chapters(),
-        assumptions=(*result.assumptions, *([f"{omitted}."] if omitted else [])),
-        left_out=study.left_out,
-        first=list(result.headlines()),
-        details=list(result.details()),
-    )
-
-
-def _show(found: CommandResult, stages: Stages) -> None:
-    """Prints all but warnings, without the bar; what is read first says the findings itself."""
+def _show(result: AbstractStudyResult, stages: Stages) -> None:
+    """Prints all but failures, without the bar; headlines say the findings themselves."""
     stages.stop()
+    headlines = list(result.headlines())
     try:
-        for block in found.first:
+        for block in headlines:
             terminal.say_rows(block)
-        for table in found.tables:
+        for table in result.tables():
             terminal.console().print(table)
-        terminal.say(*found.lines, *(() if found.first else found.findings or ()), *found.details)
+        findings = () if headlines else result.findings() or ()
+        terminal.say(*result.verdict(), *findings, *result.details())
     except (BrokenPipeError, SystemExit) as end:  # which rich makes of it
         if isinstance(end, SystemExit) and not isinstance(end.__context__, BrokenPipeError):
             raise

@@ -1,9 +1,10 @@
 """The study of a measured transmission error: which values of the variables of a design file gave it."""
 
-import csv
 import tempfile
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import partial
+from operator import itemgetter
 from pathlib import Path
 from typing import Any, ClassVar, Self
 
@@ -14,11 +15,12 @@ from ..contact import Mesh, Resolution
 from ..io import DesignFile, DesignFileError, write_design, write_flanks
 from ..io.design_file import FileDesign
 from ..io.errors import naming, problem, refused
+from ..io.results import write_csv
 from ..io.tolerance_table import quality_classes
 from ..microgeometry import AbstractModification, EndRelief, LeadCrowning, LeadSlope
-from ..numerics import check, real
+from ..numerics import UnitKey, check, real
 from ..provided import provided
-from ..report import Table
+from ..report import Figure, Record, Table, numbers_of, table_of
 from ..studies.checkpoints import Checkpoints
 from ..studies.evaluation import coarse
 from ..studies.progress import Stages
@@ -194,6 +196,29 @@ def _prior(design: DesignFile) -> dict[str, tuple[float, float]]:
     return prior
 
 
+_FIT_CAPTION = "Measured transmission error with the standard deviation of its noise, and that of the flanks found."
+_PITCH_CAPTION = "Single pitch deviations of both gears as identified, with their standard deviations."
+_UNKNOWN: tuple[Record[tuple[Any, ...]], ...] = (
+    Record("unit", "", itemgetter(0), "", "s"),
+    Record("estimate", "", itemgetter(1), "", ".4g"),
+    Record("standard_deviation", "", itemgetter(2), "standard\ndeviation", ".4g"),
+    Record("prior_mean", "", itemgetter(3), "prior\nmean", ".4g"),
+    Record("prior_standard_deviation", "", itemgetter(4), "prior\ndeviation", ".4g"),
+)
+# of the single pitch deviations of a gear and their standard deviations
+_PITCH: tuple[Record[tuple[Any, Any]], ...] = (
+    Record("largest", "", lambda of: np.abs(of[0]).max(), "largest single\npitch deviation", ".3g"),
+    Record("total", "", lambda of: np.ptp(np.cumsum(of[0])), "total cumulative\npitch deviation", ".3g"),
+    Record(
+        "deviation",
+        "",
+        lambda of: np.sqrt(np.mean(np.square(of[1]))),
+        "standard deviation\nof a single one",
+        ".3g",
+    ),
+)
+
+
 @dataclass(frozen=True)
 class IdentificationResult(AbstractStudyResult):
     """Result of the identification of variables from a measured transmission error.
@@ -218,40 +243,23 @@ class IdentificationResult(AbstractStudyResult):
         """Both modifications; raises ValueError where the estimates make none, such as a negative relief."""
         return _Flanks(self.design.design)(self.found.parameters)
 
-    def _rows(self) -> Iterator[tuple[str, str, float, float, float, float]]:
+    def _rows(self) -> dict[str, tuple[str, float, float, float, float]]:
         found, units = self.found, {**self.design.units, "torque_scale": "", "offset": "um"}
         numbers = (np.asarray(each).tolist() for each in (found.estimate, found.deviation, *found.prior))
-        for name, *values in zip(found.names[: found.own], *numbers):
-            yield name, units[name], *values
+        return {name: (units[name], *values) for name, *values in zip(found.names[: found.own], *numbers)}
 
-    def tables(self) -> list[Table]:
-        """One row per unknown, and the mesh orders of what the fit leaves."""
-        header = "unknown", "unit", "estimate", "standard\ndeviation", "prior\nmean", "prior\ndeviation"
-        result = Table(header, title=f"{self.design.title}: identified from {self.measured.name}")
-        for name, unit, *values in self._rows():
-            result.add_row(name, unit, *(f"{value:.4g}" for value in values))
+    def tables(self) -> Iterator[Table]:
+        """One row per unknown, pitch deviations, and the mesh orders of the remainder of the fit."""
+        title = f"{self.design.title}: identified from {self.measured.name}"
+        yield table_of(_UNKNOWN, self._rows(), title, "unknown")
+        if self.found.single_pitch:
+            yield table_of(_PITCH, list(self.found.single_pitch.items()), "pitch deviations [um]", "gear")
         amplitudes = self.found.residual_orders
         columns = "torque\n[N m]", *(f"order {order}\n[um]" for order in range(1, amplitudes.shape[1] + 1)), _NOISE
         left = Table(columns, title="measured minus fitted: amplitudes of the mesh orders")
         for torque, *row in zip(self.found.torques, *amplitudes.T, self.found.noise_orders):
             left.add_row(f"{torque:g}", *(f"{value:.3f}" for value in row))
-        return [result, *self._pitches(), left]
-
-    def _pitches(self) -> Iterator[Table]:
-        """The pitch deviations of every gear in few numbers."""
-        if self.found.single_pitch:
-            header = (
-                "gear",
-                "largest single\npitch deviation",
-                "total cumulative\npitch deviation",
-                "standard deviation\nof a single one",
-            )
-            result = Table(header, title="pitch deviations [um]")
-            for gear, (single, deviation) in self.found.single_pitch.items():
-                one = np.asarray(single)
-                numbers = np.max(np.abs(one)), np.ptp(np.cumsum(one)), np.sqrt(np.mean(np.square(deviation)))
-                result.add_row(gear, *(f"{number:.3g}" for number in numbers))
-            yield result
+        yield left
 
     def verdict(self) -> Iterator[str]:
         """Quality of the fit, related unknowns, what the data cannot tell, and the torque that would tell most."""
@@ -273,7 +281,7 @@ class IdentificationResult(AbstractStudyResult):
         """Estimates outside the range of their variable."""
         return [
             f"{name}: {value:.4g} {unit} is outside its range of {low:g} to {high:g} {unit}".replace("  ", " ")
-            for name, unit, value, *_ in self._rows()
+            for name, (unit, value, *_) in self._rows().items()
             for low, high in [self.design.bounds.get(name, (-np.inf, np.inf))]
             if not low <= value <= high
         ]
@@ -287,30 +295,32 @@ class IdentificationResult(AbstractStudyResult):
         except ValueError as error:
             yield f"NO DESIGN FILE: the estimates make no flank: {problem(error)}"
 
+    def inputs(self) -> dict[str, Any]:
+        """The torques."""
+        return {UnitKey("torques", "N m"): self.found.torques}
+
     def summary(self) -> dict[str, Any]:
-        """Unknowns, correlations, what the data cannot tell, and the fit."""
+        """Unknowns, correlations, directions without information, and the fit."""
         found = self.found
-        keys = "unit", "estimate", "standard_deviation", "prior_mean", "prior_standard_deviation"
         try:
             flanks = flanks_data(*self._flanks())
         except ValueError:
             flanks = {}
         return {
             "measured_file": self.measured.name,
-            "torques_Nm": found.torques,
-            "unknowns": {name: dict(zip(keys, row)) for name, *row in self._rows()},
+            "unknowns": {name: numbers_of(_UNKNOWN, row) for name, row in self._rows().items()},
             "correlation": np.asarray(found.correlation)[: found.own, : found.own],
             "singular_values": np.asarray(found.singular_values),
             "cannot_tell": found.not_told(),
-            "further_torque_Nm": found.best_candidate,
+            UnitKey("further_torque", "N m"): found.best_candidate,
             "chi_square": float(found.chi_square),
-            "model_error_um": float(found.model_error),
+            UnitKey("model_error", "um"): float(found.model_error),
             **{
-                f"{gear}_single_pitch_um": {"estimate": single, "standard_deviation": deviation}
+                UnitKey(f"{gear}_single_pitch", "um"): {"estimate": single, "standard_deviation": deviation}
                 for gear, (single, deviation) in found.single_pitch.items()
             },
-            "residual_orders_um": found.residual_orders,
-            "noise_orders_um": found.noise_orders,
+            UnitKey("residual_orders", "um"): found.residual_orders,
+            UnitKey("noise_orders", "um"): found.noise_orders,
             "converged": bool(found.converged),
             **flanks,
         }
@@ -343,73 +353,64 @@ class IdentificationResult(AbstractStudyResult):
 
     def write(self, folder: Path) -> None:
         """The unknowns as CSV, and the pair with the estimates as design file, flanks and files of other formats."""
-        with (folder / "identified.csv").open("w", newline="", encoding="utf-8") as file:
-            writer = csv.writer(file)
-            names = "name", "unit", "estimate", "standard_deviation", "prior_mean", "prior_standard_deviation"
-            writer.writerow(names)
-            writer.writerows([name, unit, *(f"{value:.7g}" for value in row)] for name, unit, *row in self._rows())
+        unknowns = ((name, *row) for name, row in self._rows().items())
+        write_csv(folder / "identified.csv", ("name", *(record.key for record in _UNKNOWN)), unknowns)
         for gear, columns in self.found.single_pitch.items():
-            with (folder / f"pitch_{gear}.csv").open("w", newline="", encoding="utf-8") as file:
-                writer = csv.writer(file)
-                writer.writerow(["tooth", "single_pitch_um", "standard_deviation_um"])
-                rows = zip(*(np.asarray(column).tolist() for column in columns))
-                writer.writerows([tooth, *(f"{value:.4f}" for value in row)] for tooth, row in enumerate(rows))
+            teeth = ((tooth, *row) for tooth, row in enumerate(zip(*map(np.asarray, columns))))
+            write_csv(folder / f"pitch_{gear}.csv", ("tooth", "single_pitch_um", "standard_deviation_um"), teeth, ".4f")
         if list(self.failures()):
             return
         write_design(folder / "identified.toml", **self._pair())
         write_flanks(folder / "flanks.csv", self.mesh, self._designs())
         list(self._exchanged(folder))
 
-    def figures(self) -> dict[str, Any]:
+    def figures(self) -> Iterator[Figure]:
         """Measured and fitted transmission error, and the flanks of prior and estimates within their tolerances."""
         from .. import plot
 
-        axes: dict[str, Any] = {"identified": self._fit()}
+        for figure in self._figures():
+            plot.emphasize(figure.figure, "identified")
+            yield figure
+
+    def _figures(self) -> Iterator[Figure]:
+        from .. import plot
+
+        torques, panels = self.found.torques, partial(plot.panels, height=_PANEL, stacked=True)
+        shown = torques[np.unique(np.linspace(0, len(torques) - 1, _MOST_PANELS).round().astype(int))]
+        yield Figure("identified", _FIT_CAPTION, panels(self._fit, shown))
         if not list(self.failures()):
             of: dict[str, Any] = {"tolerance": quality_classes(self.design)}
-            axes["k_chart"] = plot.k_chart(self.mesh, self._designs(), **of)
+            yield Figure.of(plot.k_chart, self.mesh, self._designs(), **of)
             if self.mesh.resolution.slices > 1:
-                axes["lead_chart"] = plot.lead_chart(self.mesh, self._designs(), **of)
+                yield Figure.of(plot.lead_chart, self.mesh, self._designs(), **of)
         if self.found.single_pitch:
-            axes["pitch"] = self._teeth()
-        for drawn in axes.values():
-            plot.emphasize(np.ravel(drawn)[0].figure, "identified")
-        return axes
+            yield Figure("pitch", _PITCH_CAPTION, panels(_teeth, self.found.single_pitch.items()))
 
-    def _teeth(self) -> np.ndarray:
-        """Single pitch deviations with their standard deviations, a panel per gear."""
+    def _fit(self, panel: Any, torque: float) -> None:
+        """Measured and fitted transmission error over the phase at a torque."""
         from .. import plot
 
-        pitches, style = self.found.single_pitch, {**plot.figure.line_style(0), "linestyle": "none"}
-        with plot.figure.report_axes(None, rows=len(pitches), height=_PANEL * len(pitches)) as panels:
-            for panel, (gear, given) in zip(np.ravel(panels), pitches.items()):
-                single, deviation = map(np.asarray, given)
-                tooth = np.arange(len(single))
-                panel.bar(tooth, single, color="0.8")
-                panel.errorbar(tooth, single, deviation, markersize=3, marker="o", **style)
-                panel.set(ylabel=f"{gear}: single pitch\ndeviation [µm]")
-            panel.set_xlabel("tooth")
-        return panels
+        found = self.found
+        whole = (np.asarray(each) for each in (found.phase, found.measured, found.fitted, found.noise))
+        at = np.asarray(found.torque) == torque
+        at &= np.asarray(found.phase) < np.min(np.asarray(found.phase)) + _SHOWN
+        phase, measured, fitted, noise = (each[at] for each in whole)
+        order = np.argsort(phase)
+        style = {**plot.figure.line_style(0), "linestyle": "none"}
+        panel.errorbar(phase[order], measured[order], noise[order], marker="o", markersize=3, label="measured", **style)
+        panel.plot(phase[order], fitted[order], label="fitted", **{**plot.figure.line_style(1), "linestyle": "-"})
+        panel.set(xlabel="phase [base pitches]", ylabel=f"TE at {torque:g} N m [µm]")
+        if panel.get_subplotspec().is_first_row():
+            plot.figure.legend_above(panel)
 
-    def _fit(self) -> np.ndarray:
-        """Measured and fitted transmission error over the phase, a panel per torque."""
-        from .. import plot
 
-        found, torques, first = self.found, self.found.torques, np.min(np.asarray(self.found.phase))
-        shown = torques[np.unique(np.linspace(0, len(torques) - 1, _MOST_PANELS).round().astype(int))]
-        size: dict[str, Any] = {"rows": len(shown), "height": _PANEL * len(shown)}
-        with plot.figure.report_axes(None, **size) as panels:
-            for number, (panel, torque) in enumerate(zip(np.ravel(panels), shown)):
-                at = np.flatnonzero((np.asarray(found.torque) == torque) & (np.asarray(found.phase) < first + _SHOWN))
-                at = at[np.argsort(np.asarray(found.phase)[at])]
-                phase, measured, fitted, noise = (
-                    np.asarray(each)[at] for each in (found.phase, found.measured, found.fitted, found.noise)
-                )
-                style = {**plot.figure.line_style(0), "linestyle": "none"}
-                panel.errorbar(phase, measured, noise, marker="o", markersize=3, label="measured", **style)
-                panel.plot(phase, fitted, label="fitted", **{**plot.figure.line_style(1), "linestyle": "-"})
-                panel.set(ylabel=f"TE at {torque:g} N m [µm]")
-                if number == 0:
-                    plot.figure.legend_above(panel)
-            panel.set_xlabel("phase [base pitches]")
-        return panels
+def _teeth(panel: Any, pitches: tuple[str, tuple[Any, Any]]) -> None:
+    """Single pitch deviations of a gear with their standard deviations."""
+    from .. import plot
+
+    gear, (single, deviation) = pitches
+    tooth = np.arange(len(single))
+    panel.bar(tooth, np.asarray(single), color="0.8")
+    style = {**plot.figure.line_style(0), "linestyle": "none"}
+    panel.errorbar(tooth, np.asarray(single), np.asarray(deviation), markersize=3, marker="o", **style)
+    panel.set(xlabel="tooth", ylabel=f"{gear}: single pitch\ndeviation [µm]")

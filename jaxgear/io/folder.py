@@ -10,81 +10,12 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-# A folder that holds anything else, or no summary of this program, is not an earlier result and is never replaced.
-RESULT_FILES = frozenset(
-    {
-        "summary.json",
-        "report.html",
-        "flanks.csv",
-        "front.csv",
-        "front.png",
-        "convergence.png",
-        "iterations_relief.png",
-        "iterations_transmission_error.png",
-        "response_surface.png",
-        "transmission_error.png",
-        "transmission_error_orders.png",
-        "load_sharing.png",
-        "pressure.png",
-        "ppte_over_torque.png",
-        "ppte_distribution.png",
-        "harris_map.png",
-        "k_chart.png",
-        "lead_chart.png",
-        "pressure_map.png",
-        "plane_of_action.png",
-        "contact_pattern.png",
-        "contact_pattern_unmodified.png",
-        "contact_pattern_layout.png",
-        "line_load.png",
-        "face_gap.png",
-        "face_load_over_torque.png",
-        "responses.csv",
-        "dynamic_factor.png",
-        "dte_rms.png",
-        "waterfall.png",
-        "order_tracks.png",
-        "run_up.csv",
-        "run_up.png",
-        "branches.png",
-        "bifurcation.png",
-        "phase_portrait.png",
-        "life.csv",
-        "revolution.csv",
-        "revolution.png",
-        "orders.csv",
-        "orders.png",
-        "identified.csv",
-        "identified.toml",
-        "identified.rexs",
-        "identified.png",
-        "pitch.png",
-        "pitch_pinion.csv",
-        "pitch_wheel.csv",
-        "mesh.npz",
-        "transmission_error.csv",
-        "stiffness.csv",
-        "force_map.csv",
-        "te_orders.csv",
-        "worn_flanks.csv",
-        "worn_flanks.parquet",
-        "worn_pinion.png",
-        "worn_wheel.png",
-        "ppte_over_life.png",
-        "depth_over_life.png",
-        "life_ppte_distribution.png",
-        "dynamic_factor_over_life.png",
-        "profiles.csv",
-        "tolerance_cases.png",
-        "face_load_factors.png",
-        "shaft_deflection.png",
-        "radar.png",
-    }
-)
+# key of summary.json: names of all files of the result. A folder that holds any other is never replaced.
+CONTENTS = "contents"
 
 
 @contextmanager
-def result_folder(target: str | Path, files: frozenset[str] = frozenset()) -> Iterator[Path]:
+def result_folder(target: str | Path) -> Iterator[Path]:
     """A temporary folder beside `target` that takes its place when the block ends without an exception.
 
     An earlier result in `target` is replaced. After an exception or an interruption nothing is left behind and an
@@ -92,14 +23,13 @@ def result_folder(target: str | Path, files: frozenset[str] = frozenset()) -> It
 
     Args:
         target: folder of the results.
-        files: names that results may have beside `RESULT_FILES`.
 
     Raises:
         ValueError: when the target is a file, a folder with other content or the one the caller is in, or cannot be
             written.
     """
     target = Path(target)
-    _check_target(target, RESULT_FILES | files)
+    _check_target(target)
     parent = target.absolute().parent
     missing = [folder for folder in (parent, *parent.parents) if not folder.exists()]
     temporary = None
@@ -170,29 +100,30 @@ def writing(path: str | Path) -> Iterator[None]:
         raise ValueError(f"{path}: cannot be written: {error.strerror or error}") from None
 
 
-def _check_target(target: Path, known: frozenset[str]) -> None:
+def _check_target(target: Path) -> None:
     with writing(target):
         if not target.exists() and not target.is_symlink():
             return
         if not target.is_dir():
             raise ValueError(f"{target}: is a file, not a folder")
         names = sorted(entry.name for entry in target.iterdir())
-    others = [name for name in names if name not in known]
-    if names and (others or not _is_ours(target)):
-        found = (others or names)[0]
-        raise ValueError(f"{target}: holds other files than results of jaxgear ({found}), choose another folder")
+    known = _contents(target)
+    other = next((name for name in names if name not in known), None)
+    if other is not None:
+        raise ValueError(f"{target}: holds other files than results of jaxgear ({other}), choose another folder")
     if Path.cwd().is_relative_to(target.resolve()):
         raise ValueError(f"{target}: is the folder you are in and would be replaced, choose one below it")
     if not os.access(target, os.W_OK):
         raise ValueError(f"{target}: cannot be written: Permission denied")
 
 
-def _is_ours(folder: Path) -> bool:
-    """Whether the summary of a run of this program is there."""
+def _contents(folder: Path) -> list[str]:
+    """Names of the files of an earlier result of this program; empty list without one."""
     try:
-        return "jaxgear" in json.loads((folder / "summary.json").read_text(encoding="utf-8"))["versions"]
+        held = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+        return list(held[CONTENTS]) if "jaxgear" in held["versions"] else []
     except (OSError, ValueError, KeyError, TypeError):
-        return False
+        return []
 
 
 def _replace(temporary: Path, target: Path) -> None:

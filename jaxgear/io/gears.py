@@ -8,7 +8,7 @@ from typing import Any
 from ..geometry import Gear, GearPair, Material, pair_with_backlash
 from ..manufacture import ToothProfile, ToothThickness, drawn_gear
 from ..microgeometry import AbstractModification
-from ..numerics import Number, changed, fields_of
+from ..numerics import Number, UnitKey, changed, fields_of
 from ..numerics import real as real_number
 from .errors import DesignFileError, suggestion
 from .flanks import FlankFileSection, flank_part
@@ -115,10 +115,8 @@ def drawing_of(section: GearSection) -> dict[str, Any]:
     """
     given, units = section.fields, fields_of(ToothThickness)
     found: dict[str, Any] = {} if isinstance(section.material, Part) else {"material": section.material or _STEEL}
-    for name in units:
-        if name in given and not isinstance(given[name], Free):
-            found[f"{name}_{units[name].unit}" if units[name].unit else name] = given[name]
-    return found
+    names = (name for name in units if name in given and not isinstance(given[name], Free))
+    return found | {UnitKey(name, units[name].unit): given[name] for name in names}
 
 
 def check_pitches(*sections: GearSection) -> None:

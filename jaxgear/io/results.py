@@ -6,7 +6,7 @@ Columns end in their unit; `design_um` and `measured_um` have the sign of the ma
 import csv
 import json
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -65,12 +65,13 @@ def write_traces(path: str | Path, traces: Sequence[Trace], measured: Sequence[T
                 if not np.allclose(getattr(one, field), getattr(other, field), rtol=0, atol=_SAME_PLACE):
                     raise ValueError(f"write_traces: {field} of measured trace {number} is not that of the design")
         columns[MEASURED] = [np.asarray(trace.design) for trace in measured]
-    with writing(path), Path(path).open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        writer.writerow(["trace", *columns])
-        for number, trace in enumerate(traces):
-            for row in zip(*(values[number] for values in columns.values())):
-                writer.writerow([trace.kind, *map(_text, row)])
+    rows = (
+        (trace.kind, *map(_text, row))
+        for number, trace in enumerate(traces)
+        for row in zip(*(values[number] for values in columns.values()))
+    )
+    with writing(path):
+        write_csv(Path(path), ["trace", *columns], rows)
     return Path(path)
 
 
@@ -107,14 +108,16 @@ def write_wheel_points(
         deepest = max(float(np.max(profile.y)) for _, _, profile in _sides(left, right))
         check("radius of wheel", wheel.radius, "mm", low=deepest, open_low=True)
     columns = _WHEEL_COLUMNS if wheel is None else (*_WHEEL_COLUMNS, "wheel_radius_mm")
-    with writing(path), Path(path).open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        writer.writerow(columns)
-        for name, sign, profile in _sides(left, right):
-            x, y, *rest = (np.asarray(values, float) for values in profile)
-            table = [sign * x, y, *rest] if wheel is None else [sign * x, y, *rest, float(wheel.radius) - y]
-            writer.writerows([name, *(f"{value + 0.0:.{_WHEEL_DIGITS}f}" for value in row)] for row in zip(*table))
+    with writing(path):
+        write_csv(Path(path), columns, _wheel_rows(_sides(left, right), wheel), f".{_WHEEL_DIGITS}f")
     return Path(path)
+
+
+def _wheel_rows(sides, wheel: GrindingWheel | None) -> Iterator[tuple[Any, ...]]:
+    for name, sign, profile in sides:
+        x, y, *rest = (np.asarray(values, float) for values in profile)
+        radius = [] if wheel is None else [float(wheel.radius) - y]
+        yield from ((name, *(value + 0.0 for value in row)) for row in zip(sign * x, y, *rest, *radius))
 
 
 def write_wheel_drawing(path: str | Path, left: WheelProfile, right: WheelProfile | None = None) -> Path:
@@ -204,23 +207,30 @@ def flank_rows(
                     yield design, gear, float(face[line]), float(angle), float(length), float(size), float(amount)
 
 
-def write_flanks(path: Path, mesh: Mesh | Kinematics, designs: Designs) -> None:
-    """Writes `flank_rows` as CSV, values to a nanometre or better."""
+def write_csv(path: Path, header: Iterable[str], rows: Iterable[Iterable[Any]], form: str = ".7g") -> None:
+    """Writes rows of texts and numbers as CSV; a number that is not whole in a format."""
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
-        writer.writerow(_COLUMNS)
-        for design, gear, *values in flank_rows(mesh, designs):
-            writer.writerow([design, gear, *(f"{value:.6f}" for value in values)])
+        writer.writerow(header)
+        writer.writerows([_cell(value, form) for value in row] for row in rows)
+
+
+def _cell(value: Any, form: str) -> Any:
+    if isinstance(value, float | np.floating):
+        return f"{value:{form}}"
+    return int(value) if isinstance(value, np.bool_) else value
+
+
+def write_flanks(path: Path, mesh: Mesh | Kinematics, designs: Designs) -> None:
+    """Writes `flank_rows` as CSV, values to a nanometre or better."""
+    write_csv(path, _COLUMNS, flank_rows(mesh, designs), ".6f")
 
 
 def write_front(path: Path, front: Front) -> None:
     """Writes a Pareto front as CSV: objectives and parameters of every design."""
     names = [f"{name}_{unit}" if unit else name for name, unit in zip(front.objectives, front.units)]
     columns = [*front.values.T, *front.parameters.values()]
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        writer.writerow(map(as_text, [*names, *front.parameters]))
-        writer.writerows([f"{value:.9g}" for value in row] for row in zip(*columns))
+    write_csv(path, map(as_text, [*names, *front.parameters]), zip(*columns), ".9g")
 
 
 def write_summary(path: Path, data: Mapping[str, Any]) -> None:

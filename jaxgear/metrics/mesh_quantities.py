@@ -9,7 +9,7 @@ from jaxtyping import Array, Float
 
 from ..contact import MeshCycle
 from ..geometry import margins
-from ..numerics import over_batch
+from ..numerics import UnitKey, over_batch
 from ..numerics.reductions import Average, Harmonic, Max, Min, Range, Rms
 from .contact_lines import axial_force, contact_line_lengths, shuttling_moment, tilting_moments, total_contact_ratio
 from .excitation import force_excitation, relative_transmission_error
@@ -372,7 +372,7 @@ def summary(cycle: MeshCycle) -> dict[str, Float[Array, ""]]:
     names = _SUMMARY if cycle.kinematics.resolution.slices == 1 else (*_SUMMARY, *_OVER_FACE)
     names = (*names, *_OBLIQUE) if cycle.kinematics.helical else names
     return {
-        "torque_Nm": cycle.torque,
+        UnitKey("torque", "N m"): cycle.torque,
         **{MESH_QUANTITIES[name].key: MESH_QUANTITIES[name](cycle) for name in names},
         "converged": jnp.all(cycle.converged),
     }

@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ..contact import MeshCycle
-from ..numerics import Checked, over_batch
+from ..numerics import Checked, UnitKey, over_batch
 from ..numerics.reductions import AbstractReduction, Value
 from .analysis import Analysis
 
@@ -116,7 +116,7 @@ class Quantity(eqx.Module):
     @property
     def heading(self) -> str:
         """In words with the unit: `PPTE [um]`, `contact ratio`."""
-        return f"{self.words} [{self.unit}]" if self.unit else self.words
+        return self.key.heading
 
     @property
     def named(self) -> str:
@@ -124,10 +124,9 @@ class Quantity(eqx.Module):
         return f"{self.name} [{self.unit}]" if self.unit else self.name
 
     @property
-    def key(self) -> str:
+    def key(self) -> UnitKey:
         """Name with the unit, as tables and summaries carry it: `ppte_um`, `max_line_load_N_per_mm`."""
-        suffix = self.unit.replace(" ", "").replace("/", "_per_")
-        return f"{self.name}_{suffix}" if suffix else self.name
+        return UnitKey(self.name, self.unit, self.words)
 
     @property
     def sign(self) -> int:

@@ -29,6 +29,7 @@ from .dense import solve_dense as solve_dense
 from .elimination import over_slices as over_slices
 from .fields import Checked as Checked
 from .fields import Number as Number
+from .fields import UnitKey as UnitKey
 from .fields import Usual as Usual
 from .fields import changed as changed
 from .fields import check as check

@@ -8,7 +8,7 @@ import dataclasses
 import logging
 from collections.abc import Iterator
 from dataclasses import MISSING
-from typing import Any, Literal, NamedTuple, TypedDict, TypeVar, Unpack, dataclass_transform, get_args, get_origin
+from typing import Any, Literal, NamedTuple, Self, TypedDict, TypeVar, Unpack, dataclass_transform, get_args, get_origin
 
 import equinox as eqx
 import jax
@@ -52,6 +52,34 @@ class Usual(NamedTuple):
     def text(self, value: float) -> str:
         """A number to four digits with the unit."""
         return f"{float(f'{value:.4g}'):g} {self.unit}".rstrip()
+
+
+class UnitKey(str):
+    """Name of a number with its unit, as files carry it (`ppte_um`), which knows its heading (`PPTE [um]`).
+
+    Attributes:
+        name: without the unit.
+        unit: "" for a pure number.
+        heading: in words with the unit in brackets.
+    """
+
+    name: str
+    unit: str
+    heading: str
+
+    def __new__(cls, name: str, unit: str = "", words: str = "") -> Self:
+        """The key of a name; `words` stand in the heading in place of it."""
+        suffix = _IN_NAMES.get(unit) or unit.replace(" ", "").replace("/", "_per_")
+        made = super().__new__(cls, f"{name}_{suffix}" if unit else name)
+        words = words or name.replace("_", " ")
+        made.name, made.unit, made.heading = name, unit, f"{words} [{unit}]" if unit else words
+        return made
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return UnitKey, (self.name, self.unit), vars(self)
+
+
+_IN_NAMES = {"%": "percent", "MPa^0.5": "sqrt_MPa"}  # units that files spell
 
 
 @dataclasses.dataclass(frozen=True)

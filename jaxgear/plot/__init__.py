@@ -16,6 +16,7 @@ from .dynamics import speed_scale as speed_scale
 from .dynamics import transmission_error_orders as transmission_error_orders
 from .dynamics import waterfall as waterfall
 from .figure import emphasize as emphasize
+from .figure import panels as panels
 from .figure import same_styles as same_styles
 from .figure import save as save
 from .flank import contact_pattern as contact_pattern

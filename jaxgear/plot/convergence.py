@@ -12,20 +12,15 @@ from numpy.typing import ArrayLike
 from ..contact import Mesh
 from ..metrics import profile_relief
 from ..optimize import Iterate, Optimum
-from .figure import (
-    ABOVE_MARKS,
-    grow,
-    legend_above,
-    line_style,
-    mark_path,
-    marker_style,
-    report_axes,
-    styled,
-)
+from .figure import ABOVE_MARKS, captioned, grow, legend_above, line_style, mark_path, marker_style, report_axes, styled
 from .front import ANALYSES_LABEL, best_label, logarithmic, wrapped
 from .mesh_cycle import PATH_LABEL, PHASE_LABEL, two_pitches
 
 
+@captioned(
+    "Course of the search: best objective over the contact analyses spent. Dotted: as judged on the finer grid on "
+    "which the search ends."
+)
 def convergence(optima: Mapping[str, Optimum], ax: Axes | None = None) -> Axes:
     """Best objective met over the contact analyses spent, with a mark at the end of every search.
 
@@ -79,6 +74,7 @@ _LABELLED = 8  # states in the legend
 _FIRST, _LAST = 0.78, 0.0  # part of the colour map: what comes later is darker
 
 
+@captioned("Relief after every iteration of the search.")
 def iterations_relief(
     mesh: Mesh, optimum: Optimum, gear: Literal["pinion", "wheel"] = "pinion", ax: Axes | None = None
 ) -> Axes:
@@ -110,6 +106,7 @@ def iterations_relief(
     return ax
 
 
+@captioned("Transmission error after every iteration of the search.")
 def iterations_transmission_error(optimum: Optimum, phase: ArrayLike, ax: Axes | None = None) -> Axes:
     """Transmission error [um] of every state of an iteration over two base pitches, with its PPTE in the legend.
 

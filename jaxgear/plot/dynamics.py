@@ -15,7 +15,7 @@ from ..contact import MeshCycle
 from ..dynamics import Branch, RunUp, SpeedResponse
 from ..metrics import harmonics
 from ..numerics import program
-from .figure import GREY, colour_bar, legend_above, line_style, marker_style, report_axes, styled
+from .figure import GREY, captioned, colour_bar, legend_above, line_style, marker_style, report_axes, styled
 
 FREQUENCY_LABEL = "mesh frequency [Hz]"
 _APPROACH_LABEL = "dynamic transmission error [µm]"
@@ -205,6 +205,7 @@ def bifurcation(responses: Runs, ax: Axes | None = None, *, title: str = "") -> 
     return ax
 
 
+@captioned("Stable and unstable periodic motions of the unmodified design.")
 def branches(
     found: Sequence[Branch],
     of: Literal["dynamic_factor", "dte_rms"] = "dynamic_factor",
@@ -316,6 +317,7 @@ def _entitle(ax: Axes, title: str, lines: int) -> None:
 _GROUP = 0.8  # of the distance between two orders, which the bars of all designs share
 
 
+@captioned("Amplitudes of the transmission error at the orders of the mesh frequency.")
 def transmission_error_orders(cycles: Mapping[str, MeshCycle], ax: Axes | None = None, *, count: int = 8) -> Axes:
     """Amplitudes of the mesh harmonics of the transmission error [um] as bars, design beside design.
 

@@ -1,6 +1,6 @@
 """Common parts of all figures: report size, line styles, marks and files."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from io import BytesIO
@@ -67,6 +67,16 @@ _Drawn = TypeVar("_Drawn")
 _NUMBERS: ContextVar[Mapping[str, int]] = ContextVar("numbers of designs", default=MappingProxyType({}))
 # style numbers of designs, best first, that stand apart from the black of the first design and from a blue cloud
 APART = (1, 3, 4, 5, 2, 6, 7)
+
+
+def captioned(caption: str) -> Callable[[_Drawn], _Drawn]:
+    """Gives a plot function the caption of its figures in reports, as its attribute `caption`."""
+
+    def mark(draw: _Drawn) -> _Drawn:
+        setattr(draw, "caption", caption)  # noqa: B010 - a function has no such attribute for type checkers
+        return draw
+
+    return mark
 
 
 @contextmanager
@@ -141,6 +151,33 @@ def report_axes(
             panel.tick_params(labelsize=FONT, width=0.6, length=3)
             panel.grid(True, color=PALE, linewidth=0.5)
         yield panels if len(panels) > 1 else panels[0]
+
+
+def panels(
+    draw: Callable[[Axes, _Drawn], object],
+    each: Iterable[_Drawn],
+    *,
+    width: float = WIDTH,
+    height: float = HEIGHT,
+    stacked: bool = False,
+) -> Axes | np.ndarray:
+    """A new figure of several panels with a common ordinate, or with a common abscissa where they are stacked.
+
+    Args:
+        draw: draws into the Axes of a panel; inner panels lose the label of the axis that all have in common.
+        each: what the panels show.
+        width, height: of a panel [mm].
+        stacked: True for panels on top of each other, False for panels side by side.
+    """
+    shown = list(each)
+    count, kind = len(shown), "rows" if stacked else "columns"
+    size = {"width": width, "height": height * count} if stacked else {"width": width * count, "height": height}
+    with report_axes(None, **{kind: count}, **size) as made:  # type: ignore[arg-type]
+        for panel, drawn in zip(np.ravel(made), shown):
+            draw(panel, drawn)
+        for panel in np.ravel(made)[:-1] if stacked else np.ravel(made)[1:]:
+            panel.set(**{"xlabel" if stacked else "ylabel": ""})
+    return made
 
 
 @contextmanager

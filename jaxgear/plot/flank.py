@@ -23,6 +23,7 @@ from .figure import (
     HEIGHT,
     PALE,
     Panels,
+    captioned,
     colour_bar,
     legend_above,
     legend_over_panels,
@@ -143,6 +144,10 @@ def topography(mesh: Mesh, design: Design, ax: Panels | None = None) -> np.ndarr
 _POINTS = 201  # across the face
 
 
+@captioned(
+    "Modification across the face, at the pitch point. A shaded band is the total helix tolerance of the quality "
+    "class about the design that the legend names."
+)
 def lead_chart(
     mesh: Mesh,
     designs: Mapping[str, Design],
@@ -194,6 +199,10 @@ def _over_face(panel: Axes, side: Side, title: str) -> None:
 _ABOVE_DIAMETERS = 34.0  # [pt]; clears numbers and label of the upper axis
 
 
+@captioned(
+    "Profile modification of both gears over the roll angle, material removed downwards (K-chart). A shaded band "
+    "is the total profile tolerance of the quality class about the design that the legend names."
+)
 def k_chart(
     mesh: Mesh,
     designs: Mapping[str, Design],
@@ -262,6 +271,7 @@ def _over_roll_angle(panel: Axes, side: Side, title: str) -> None:
 _FACE_LABEL, _PRESSURE_LABEL, _LOAD_LABEL = "face coordinate [mm]", "flank pressure [MPa]", "line load [N/mm]"
 
 
+@captioned("Pressure over path of contact and face width.")
 def pressure_map(cycle: MeshCycle, ax: Axes | None = None) -> Axes:
     """Hertzian pressure [MPa] of one pair over its path of contact and the face width; white where the flanks part.
 
@@ -277,6 +287,10 @@ def pressure_map(cycle: MeshCycle, ax: Axes | None = None) -> Axes:
     return _over_plane(cycle, cycle.contact_pressure, _PRESSURE_LABEL, limits, ax)
 
 
+@captioned(
+    "Load per length over the plane of action, tip edges before A and after E included, with the contact lines at "
+    "its largest value."
+)
 def plane_of_action(cycle: MeshCycle, ax: Axes | None = None) -> Axes:
     """Line load [N/mm] of one pair all over the plane of action: along the line of action and over the face.
 
@@ -307,6 +321,7 @@ def _over_plane(cycle: MeshCycle, values: Array, label: str, limits: tuple[float
     return ax
 
 
+@captioned("Contact pattern: largest pressure of every place of the flank over a whole mesh.")
 def contact_pattern(cycle: MeshCycle, ax: Panels | None = None) -> np.ndarray:
     """Contact pattern: Hertzian pressure [MPa] over the roll angle and the face width of pinion and wheel.
 
@@ -370,6 +385,7 @@ def _draw(ax: Axes, along: np.ndarray, face: np.ndarray, flank: np.ndarray, most
     return ax.pcolormesh(along, across, flank, cmap="cividis_r", vmin=0, vmax=most)
 
 
+@captioned("Load per length over the face.")
 def line_load(cycle: MeshCycle, ax: Axes | None = None, *, position: int | None = None) -> Axes:
     """Line load [N/mm] of every loaded pair over the face at one mesh position, the mean over the face beside it.
 
@@ -401,6 +417,7 @@ def line_load(cycle: MeshCycle, ax: Axes | None = None, *, position: int | None 
     return ax
 
 
+@captioned("Gap over the face before the load closes it.")
 def face_gap(cycle: MeshCycle, mesh: Mesh, ax: Axes | None = None, *, position: int | None = None) -> Axes:
     """Gap [um] between the flanks of the pair with the largest force over the face at one mesh position, unloaded and
     under load.

@@ -24,6 +24,7 @@ from .figure import (
     FONT,
     GREY,
     HEIGHT,
+    captioned,
     colour_bar,
     legend_above,
     line_style,
@@ -83,6 +84,7 @@ _POINTS = 5000  # more variants than this are counted in hexagons: dots would ru
 _HEXAGONS = 60  # across
 
 
+@captioned("Results of the variants against each other, with the Pareto front.")
 def pareto(table: Table[Of], ax: Axes | None = None, *, marked: Mapping[str, int] | None = None) -> Axes:
     """Variants that no other one beats in two results, or in three with the third as colour, over all the others.
 
@@ -170,6 +172,7 @@ def front_star(ax: Axes, values: np.ndarray, text: str, index: int = 0) -> None:
 _STYLES_OF_FRONT = 3  # that front and star take
 
 
+@captioned("Pareto front: designs of which none is better in every objective.")
 def optimum_front(
     front: Front,
     chosen: int | None = None,
@@ -214,6 +217,7 @@ _DARK, _LIGHT = 0.0, 0.72  # part of the colour map that shows on white
 _MOST_BEST = 5  # variants that stand out
 
 
+@captioned("Variables and results of the variants, one line per variant.")
 def parallel_coordinates(
     table: Table[Of],
     colour_by: Of,

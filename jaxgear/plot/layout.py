@@ -17,6 +17,7 @@ from .figure import (
     PALE,
     WIDTH,
     Panels,
+    captioned,
     legend_above,
     line_style,
     marker_style,
@@ -36,6 +37,7 @@ _LINE = 16  # characters of a label
 _LINES, _TITLE_PAD = 2, 9.0  # lines on the upper spoke, and the distance of the title that clears them [pt]
 
 
+@captioned("Results of chosen variants side by side.")
 def radar(
     table: Table[Of],
     variants: Sequence[int] | None = None,
@@ -197,6 +199,7 @@ def tolerance_line_load(cases: ToleranceCases, ax: Axes | None = None, *, title:
     return panel
 
 
+@captioned("Face load factor under the combinations of deviations within the tolerances.")
 def face_load_factors(cases: Mapping[str, ToleranceCases], ax: Axes | None = None) -> Axes:
     """K_Hbeta of the five cases of deviations, one line of marks per flank line; hollow marks where an edge is touched.
 
@@ -227,6 +230,7 @@ _ROOM = 1.35  # of a panel, over the largest radius drawn
 _GEAR = "#EEF3F7"
 
 
+@captioned("Elastic lines of the shafts at the design torque, exaggerated, with bearings and gears.")
 def shaft_deflection(gearbox: Gearbox, ax: Panels | None = None) -> np.ndarray:
     """Shafts of a gearbox side-on with their elastic lines, one panel each, in the direction of the largest deflection.
 

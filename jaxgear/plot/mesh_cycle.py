@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from ..contact import MeshCycle
 from ..metrics import load_sharing as share
 from ..metrics import secant_stiffness
-from .figure import ABOVE_MARKS, GREY, legend_above, line_style, mark_path, report_axes, styled
+from .figure import ABOVE_MARKS, GREY, captioned, legend_above, line_style, mark_path, report_axes, styled
 
 PATH_LABEL = "path of contact from the pitch point [mm]"
 PHASE_LABEL = "mesh phase [base pitches]"
@@ -75,6 +75,7 @@ def two_pitches(phase: ArrayLike, curve: ArrayLike) -> tuple[np.ndarray, np.ndar
     return np.concatenate(ends), np.concatenate([curve, curve, curve[..., :1]], axis=-1)
 
 
+@captioned("Loaded transmission error over two base pitches at the design torque, with its peak-to-peak value (PPTE).")
 def transmission_error(cycles: Mapping[str, MeshCycle], ax: Axes | None = None) -> Axes:
     """Loaded transmission error [um] of several designs over two base pitches, with their PPTE in the legend.
 
@@ -92,6 +93,7 @@ def transmission_error(cycles: Mapping[str, MeshCycle], ax: Axes | None = None) 
     return ax
 
 
+@captioned("Share of the load that one tooth pair carries on its way along the path of contact.")
 def load_sharing(cycles: Mapping[str, MeshCycle], ax: Axes | None = None) -> Axes:
     """Share of one pair in the total force over its whole path, corner contact before A and after E included.
 
@@ -134,6 +136,7 @@ _DECADE = (1, 2, 5)  # ticks
 _LINEAR = 1.5  # share of the linear part of the scale [decades of the logarithmic one]
 
 
+@captioned("Largest pressure of one tooth pair along the path of contact, of flanks and tip corners (dots).")
 def pressure(cycles: Mapping[str, MeshCycle], ax: Axes | None = None) -> Axes:
     """Hertzian pressure [MPa] of one pair over its path of contact, the largest of all slices.
 

@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 
 from ..revolution import Revolution, Teeth, named_orders
 from ..revolution.orders import amplitudes
-from .figure import WIDTH, legend_above, line_style, report_axes, styled, text_above
+from .figure import WIDTH, captioned, legend_above, line_style, report_axes, styled, text_above
 
 _KINDS = {"mesh": ("o", 0), "shaft order": ("s", 2), "side band": ("^", 1), "ghost order": ("D", 3)}  # mark, style
 _FURTHER = "#B0B0B0"  # colour of lines without a name
@@ -15,6 +15,7 @@ _DECADES = 3.5  # below the largest amplitude
 _BEYOND = 0.55  # mesh orders behind the last one that is named
 
 
+@captioned("Transmission error over the first revolution of the gear with more teeth.")
 def revolution(of: Mapping[str, Revolution], ax: Axes | None = None) -> Axes:
     """Transmission error [um] of several designs over the first revolution of the gear with more teeth.
 

@@ -22,6 +22,7 @@ from .figure import (
     ABOVE_MARKS,
     FONT,
     GREY,
+    captioned,
     colour_bar,
     laid_out_size,
     legend_above,
@@ -79,6 +80,7 @@ _LEVELS = 11
 _EDGE = 0.04  # part of the Axes along its edges that is too close for a label
 
 
+@captioned("Transmission error over phase and torque.")
 def response_surface(
     phase: ArrayLike,
     torques: ArrayLike,
@@ -178,6 +180,7 @@ def fan(scatter: Scatter, ax: Axes | None = None) -> Axes:
     return ax
 
 
+@captioned("Share of the manufactured pairs whose PPTE stays below a value.")
 def ppte_distribution(
     samples: Mapping[str, ArrayLike],
     ax: Axes | None = None,
@@ -218,6 +221,7 @@ _PPTE_LABEL = "peak-to-peak\ntransmission error [µm]"
 _DARK, _LIGHT = 0.0, 0.72  # part of the colour map that shows on white
 
 
+@captioned("PPTE over the torque.")
 def ppte_over_torque(
     torques: ArrayLike, curves: Mapping[str, ArrayLike], ax: Axes | None = None, design_torque: float | None = None
 ) -> Axes:
@@ -257,6 +261,7 @@ def ppte_over_overlap(
     return ax
 
 
+@captioned("Face load factor over the torque.")
 def face_load_over_torque(
     torques: ArrayLike, curves: Mapping[str, ArrayLike], ax: Axes | None = None, design_torque: float | None = None
 ) -> Axes:
@@ -299,6 +304,7 @@ def _over(ax: Axes, abscissa: ArrayLike, curves: Mapping[str, ArrayLike], marks:
     legend_above(ax, distance=ABOVE_MARKS if marks else ABOVE)
 
 
+@captioned("Harris map: transmission error over two base pitches at several torques.")
 def harris_map(
     phase: ArrayLike, torques: ArrayLike, te: ArrayLike, ax: Axes | None = None, *, design: str | None = None
 ) -> Axes:

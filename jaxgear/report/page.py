@@ -1,12 +1,12 @@
 """The report: what it consists of, as plain text, and as an HTML page."""
 
 import base64
-import hashlib
 import struct
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
+from typing import TYPE_CHECKING, Any, Self
 from unicodedata import category
 
 import numpy as np
@@ -15,8 +15,12 @@ from rich.box import SIMPLE_HEAD
 from rich.console import Console, ConsoleOptions
 
 from ..io import writing
+from ..numerics import UnitKey
 from ..numerics.durable import write_durably
 from ..vocabulary import quantities
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure as Drawing
 
 
 def needed(*modules: str) -> None:
@@ -31,26 +35,6 @@ def needed(*modules: str) -> None:
     for module in modules:
         if find_spec(module) is None:
             raise ValueError(f"--report needs the library {module}: pip install 'jaxgear[report]'")
-
-
-@dataclass(frozen=True)
-class Source:
-    """A design file as it was read.
-
-    Attributes:
-        name: of the file, without its folders.
-        text: what it holds.
-        sha256: hash of its bytes, in hexadecimal digits.
-    """
-
-    name: str
-    text: str
-    sha256: str
-
-    @classmethod
-    def of(cls, path: Path, content: bytes) -> "Source":
-        """The file of a path, from its bytes."""
-        return cls(path.name, content.decode("utf-8-sig", "replace"), hashlib.sha256(content).hexdigest())
 
 
 _LABEL_WIDTH, _CELL_WIDTH = 32, 10  # of a table whose columns must fit [characters]
@@ -97,10 +81,36 @@ class Table:
 
 @dataclass(frozen=True)
 class Figure:
-    """A picture.
+    """A figure of a result, drawn and not yet written.
 
     Attributes:
-        name: of its file without the ending.
+        name: name of its file without the ending.
+        caption: what it shows, for the report.
+        axes: Axes that it consists of, one or an array.
+    """
+
+    name: str
+    caption: str
+    axes: Any
+
+    @classmethod
+    def of(cls, draw: Callable[..., Any], *args: object, **options: object) -> Self:
+        """The figure that a plot function with a caption draws, named after the function."""
+        return cls(draw.__name__, draw.caption, draw(*args, **options))  # type: ignore[attr-defined]
+
+    @property
+    def figure(self) -> "Drawing":
+        """The figure of matplotlib."""
+        drawn: Drawing = np.ravel(self.axes)[0].figure
+        return drawn
+
+
+@dataclass(frozen=True)
+class Picture:
+    """The file of a figure.
+
+    Attributes:
+        name: name of the file without the ending.
         caption: what it shows.
         data: the PNG file as a data URI.
         width: on paper at its own size [mm].
@@ -131,26 +141,9 @@ class Chapter:
     warnings: Sequence[str] = ()
     points: Sequence[str] = ()
     tables: Sequence[Table] = ()
-    figures: Sequence[Figure] = ()
+    figures: Sequence[Picture] = ()
     literal: str = ""
     new_page: bool = False
-
-
-@dataclass(frozen=True)
-class Report:
-    """All of it.
-
-    Attributes:
-        title: of the design.
-        subtitle: what was done.
-        facts: name and text of what identifies the report, above its first section.
-        sections: the parts.
-    """
-
-    title: str
-    subtitle: str
-    facts: Sequence[tuple[str, str]]
-    sections: Sequence[Chapter]
 
 
 _TEMPLATES = Path(__file__).parent / "templates"
@@ -159,16 +152,26 @@ _TEMPLATES = Path(__file__).parent / "templates"
 _UPRIGHT = 210.0
 
 
-def write_report(path: Path, report: Report) -> None:
+def write_report(
+    path: Path, title: str, subtitle: str, facts: Sequence[tuple[str, str]], sections: Sequence[Chapter]
+) -> None:
     """Writes a report as one HTML file that refers to nothing outside of it.
 
     All text is escaped: names and contents of files may hold anything.
+
+    Args:
+        path: file to write.
+        title: title of the design.
+        subtitle: name of the command.
+        facts: names and texts above the first section.
+        sections: chapters in their order.
 
     Raises:
         ValueError: without the library jinja2, or when the file cannot be written.
     """
     needed("jinja2")
-    write_text(path, printable(rendered("report.html", report=report, upright=_UPRIGHT)))
+    parts = {"title": title, "subtitle": subtitle, "facts": facts, "sections": sections}
+    write_text(path, printable(rendered("report.html", **parts, upright=_UPRIGHT)))
 
 
 def write_text(path: Path, text: str) -> None:
@@ -203,63 +206,6 @@ def printable(text: str) -> str:
     )
 
 
-# in the order of the report; k-charts and other charts by the names of their files
-CAPTIONS = {
-    "transmission_error": "Loaded transmission error over two base pitches at the design torque, with its peak-to-peak "
-    "value (PPTE).",
-    "transmission_error_orders": "Amplitudes of the transmission error at the orders of the mesh frequency.",
-    "load_sharing": "Share of the load that one tooth pair carries on its way along the path of contact.",
-    "pressure": "Largest pressure of one tooth pair along the path of contact, of flanks and tip corners (dots).",
-    "pressure_map": "Pressure over path of contact and face width.",
-    "plane_of_action": "Load per length over the plane of action, tip edges before A and after E included, with the "
-    "contact lines at its largest value.",
-    "contact_pattern": "Contact pattern: largest pressure of every place of the flank over a whole mesh.",
-    "contact_pattern_unmodified": "Contact pattern without modification: largest pressure of every place of the flank.",
-    "contact_pattern_layout": "Contact pattern after all three steps: largest pressure of every place of the flank.",
-    "line_load": "Load per length over the face.",
-    "face_gap": "Gap over the face before the load closes it.",
-    "k_chart": "Profile modification of both gears over the roll angle, material removed downwards (K-chart). A shaded "
-    "band is the total profile tolerance of the quality class about the design that the legend names.",
-    "lead_chart": "Modification across the face, at the pitch point. A shaded band is the total helix tolerance of the "
-    "quality class about the design that the legend names.",
-    "ppte_over_torque": "PPTE over the torque.",
-    "ppte_distribution": "Share of the manufactured pairs whose PPTE stays below a value.",
-    "harris_map": "Harris map: transmission error over two base pitches at several torques.",
-    "response_surface": "Transmission error over phase and torque.",
-    "face_load_over_torque": "Face load factor over the torque.",
-    "convergence": "Course of the search: best objective over the contact analyses spent. Dotted: as judged "
-    "on the finer grid on which the search ends.",
-    "front": "Pareto front: designs of which none is better in every objective.",
-    "iterations_relief": "Relief after every iteration of the search.",
-    "iterations_transmission_error": "Transmission error after every iteration of the search.",
-    "dynamic_factor": "Dynamic factor over the mesh frequency, speed going up and down.",
-    "dte_rms": "Root mean square of the dynamic transmission error about its mean over the mesh frequency.",
-    "waterfall": "Campbell diagram: amplitudes of the mesh force by order over the mesh frequency.",
-    "order_tracks": "Level of the orders of the mesh force over the mesh frequency, rms values re 1 µN (ISO 1683).",
-    "run_up": "Largest mesh force over the static one while the speed rises at constant acceleration.",
-    "bifurcation": "Dynamic transmission error once per mesh cycle over the mesh frequency (bifurcation diagram).",
-    "phase_portrait": "Dynamic transmission error and its rate at the speed of the largest dynamic factor; marked once "
-    "per mesh cycle. The abscissae differ from panel to panel.",
-    "branches": "Stable and unstable periodic motions of the unmodified design.",
-    "shaft_deflection": "Elastic lines of the shafts at the design torque, exaggerated, with bearings and gears.",
-    "tolerance_cases": "Load over the face under the combinations of deviations within the tolerances.",
-    "face_load_factors": "Face load factor under the combinations of deviations within the tolerances.",
-    "revolution": "Transmission error over the first revolution of the gear with more teeth.",
-    "orders": "Amplitudes of the transmission error over the order of the pinion, with what they come from.",
-    "identified": "Measured transmission error with the standard deviation of its noise, and that of the flanks found.",
-    "pitch": "Single pitch deviations of both gears as identified, with their standard deviations.",
-    "worn_pinion": "Flank of the pinion at several time steps.",
-    "worn_wheel": "Flank of the wheel at several time steps.",
-    "ppte_over_life": "PPTE over the life.",
-    "depth_over_life": "Depth of wear over the life.",
-    "life_ppte_distribution": "Share of the manufactured pairs whose mean PPTE over the life stays below a value.",
-    "dynamic_factor_over_life": "Largest mesh force of the steady motion over the static one, over the life.",
-    "pareto": "Results of the variants against each other, with the Pareto front.",
-    "parallel_coordinates": "Variables and results of the variants, one line per variant.",
-    "radar": "Results of chosen variants side by side.",
-}
-
-_VARIANT = "_variant_"  # before the number in the name of a file
 _SIGNATURE = b"\x89PNG\r\n\x1a\n"
 _SIZE_AT = 16  # bytes before width and height (PNG specification, chunk IHDR)
 _DENSITY = b"pHYs"  # pixels per unit in both directions, and the unit
@@ -267,7 +213,7 @@ _PER_METRE = 1
 _MM = 1000.0  # per m
 
 
-def figure(path: Path) -> Figure:
+def picture(path: Path, caption: str) -> Picture:
     """A PNG file with its density written in it, to be embedded.
 
     Raises:
@@ -282,38 +228,25 @@ def figure(path: Path) -> Figure:
     if unit != _PER_METRE or density == 0:
         raise ValueError(f"{path}: does not tell its pixels per metre")
     data = f"data:image/png;base64,{base64.b64encode(held).decode()}"
-    kind = path.stem.partition(_VARIANT)[0]  # of one variant: what is said of the picture of several
-    caption = CAPTIONS.get(kind, f"{path.stem.replace('_', ' ')}.")
-    return Figure(path.stem, caption, data, pixels / density * _MM)
+    return Picture(path.stem, caption, data, pixels / density * _MM)
 
 
-# units that names end with, those first that end with another one
-_UNITS = (
-    *("N/(m s^0.5 K)", "kg/m^3", "N/mm", "N/um", "mm2/s", "m2/N", "mm3", "mm2", "mm", "um", "degC", "deg", "MPa"),
-    *("N m", "rpm", "Hz", "kg", "N", "W", "K", "h", "s"),
-)
-_ENDINGS = {"percent": "%", "sqrt_MPa": "MPa^0.5"} | {
-    unit.replace(" ", "").replace("/", "_per_"): unit for unit in _UNITS
-}
 _DIGITS = 6  # of a number
 _MOST = 12  # numbers of a list that are written out
 _BETWEEN = " / "  # names of a number inside of another
 
 
 def heading(name: str) -> str:
-    """A name of `summary.json` in words: "max_flank_pressure_MPa" becomes "max flank pressure [MPa]"."""
-    if name in quantities:
-        return quantities[name].heading
-    for ending, unit in _ENDINGS.items():
-        if name.endswith(f"_{ending}"):
-            return f"{name.removesuffix(f'_{ending}').replace('_', ' ')} [{unit}]"
-    return name.replace("_", " ")
+    """A key of `summary.json` in words, with the unit of a `UnitKey` or of a quantity of that name in brackets."""
+    if isinstance(name, UnitKey):
+        return name.heading
+    return quantities[name].heading if name in quantities else name.replace("_", " ")
 
 
 def text(value: object) -> str:
     """A value in six digits, as the whole report writes it; "-" where there is none."""
     if isinstance(value, Mapping):
-        return ", ".join(f"{heading(str(key))} {text(item)}" for key, item in value.items()) or "-"
+        return ", ".join(f"{heading(key)} {text(item)}" for key, item in value.items()) or "-"
     items = value if isinstance(value, list | tuple) else np.asarray(value)
     if not isinstance(items, np.ndarray) or items.ndim:
         shown = ", ".join(map(text, items[:_MOST]))
@@ -328,10 +261,10 @@ def text(value: object) -> str:
     return f"{number:.{_DIGITS}g}" if isinstance(number, float | np.floating) else str(number)
 
 
-def numbers(data: Mapping[str, object], within: Sequence[str] = ()) -> Iterator[tuple[str, str]]:
+def numbers(data: Mapping[str, Any], within: Sequence[str] = ()) -> Iterator[tuple[str, str]]:
     """Name and text of everything that nested data hold, in their order."""
     for name, value in data.items():
-        names = (*within, heading(str(name)))
+        names = (*within, heading(name))
         if isinstance(value, Mapping) and value:
             yield from numbers(value, names)
         elif isinstance(value, list | tuple) and value and all(isinstance(item, Mapping) for item in value):

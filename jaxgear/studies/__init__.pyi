@@ -16,6 +16,7 @@ from .export import ExportResult as ExportResult
 from .export import ExportStudy as ExportStudy
 from .layout import LayoutStudy as LayoutStudy
 from .layout_result import LayoutResult as LayoutResult
+from .optimization_result import OptimizationResult as OptimizationResult
 from .progress import Progress as Progress
 from .progress import Stages as Stages
 from .results import study_summary as study_summary

@@ -30,7 +30,7 @@ from .checkpoints import Checkpoints
 from .comparison import Modifications, rule_based
 from .comparison_result import ComparisonResult
 from .evaluation import Evaluation, coarse, evaluation_of, torques_of
-from .optimum_report import COMPROMISE
+from .optimization_result import COMPROMISE, OptimizationResult
 from .progress import Stages
 from .study import AbstractStudy
 
@@ -138,19 +138,12 @@ class ComparisonRun:
             self._stages.begin("manufacturing the designs within their tolerances")
             of = self.design, self._mesh, evaluations
             evaluations = manufactured.scattered(*of, gears)
-        return ComparisonResult(
-            self.design,
-            self._quick,
-            self._mesh,
-            self._torques,
-            evaluations,
-            side_by_side.findings(self.design, self._mesh, evaluations),
-            self._optimum,
-            self._front,
-            self._projection,
-            self._searched_at,
-            self._unverified,
-        )
+        unusual = side_by_side.findings(self.design, self._mesh, evaluations)
+        common = self.design, self._quick, self._mesh, self._torques, evaluations, unusual, self._unverified
+        if self._optimum is None:
+            return ComparisonResult(*common)
+        found = self._optimum, self._front, self._projection, self._searched_at
+        return OptimizationResult(*common, *found)
 
 
 @dataclass(frozen=True)

@@ -8,17 +8,19 @@ from typing import Any
 import numpy as np
 
 from ..contact import Mesh
-from ..io import DesignFile, write_flanks, write_front
+from ..geometry import Gear
+from ..io import DesignFile, write_flanks
 from ..metrics import Finding
-from ..optimize import Front, Optimum, Projection
-from ..report import Chapter, Table
-from . import comparison_summary, manufactured, optimum_report, side_by_side
+from ..numerics import UnitKey, fields_of
+from ..optimize import Verified
+from ..report import Chapter, Figure, Table, numbers, text
+from ..shafts import RigidSupport
+from ..vocabulary import quantities
+from . import manufactured, side_by_side
 from .evaluation import Evaluation
-from .gear_data import mounting
-from .optimum_report import front_table
+from .gear_data import FACTORS, gears, mounting, rating_page
 from .study import AbstractStudyResult
-
-_USUAL = "none, inputs and results lie within the usual ranges"
+from .summary_data import fields_data, finding_data, flanks_data, key_of, model, sizes
 
 
 @dataclass(frozen=True)
@@ -31,11 +33,7 @@ class ComparisonResult(AbstractStudyResult):
         mesh: on which the designs are evaluated.
         torques: over the range of the file, at which they are evaluated [N m], shape (torques,).
         evaluations: designs by their names, the first of which is unmodified.
-        unusual: what of every design is out of the usual range, by its name.
-        optimum: what a search has found; None without one.
-        front: of which the optimum is the compromise; None without one.
-        projection: of the optimum on a curve; None without one.
-        searched_at: positions at which the search began.
+        unusual: findings of every design, by its name.
         unverified: why nothing is verified by finite elements; "" where it is, or is not asked for.
     """
 
@@ -45,68 +43,66 @@ class ComparisonResult(AbstractStudyResult):
     torques: np.ndarray
     evaluations: Mapping[str, Evaluation]
     unusual: Mapping[str, tuple[Finding, ...]]
-    optimum: Optimum | None = None
-    front: Front | None = None
-    projection: Projection | None = None
-    searched_at: int = 0
-    unverified: str = ""
+    unverified: str
+
+    def inputs(self) -> dict[str, Any]:
+        """Load, tables, tolerances, model and array sizes."""
+        file = self.design
+        tables = {name: part for name in ("lubricant", "strength") if (part := file.tables.get(name)) is not None}
+        return {
+            UnitKey("torque", "N m"): file.signed_torque,
+            UnitKey("torque_range", "N m"): file.torque_range,
+            UnitKey("speed", "rpm"): file.speed,
+            "friction": file.friction,
+            **{name: fields_data(part, units=True) for name, part in tables.items()},
+            **manufactured.tolerances(file),
+            "model": model(self.mesh),
+            "resolution": sizes(self.mesh.resolution),
+        }
 
     def summary(self) -> dict[str, Any]:
-        """Every number of the designs, and the optimum."""
-        data = comparison_summary.summary(self.design, self.mesh, self.evaluations, self.torques, self.unusual)
-        if self.optimum is not None:
-            data["optimum"] = optimum_report.summary(self.design, self.optimum, self.projection)
-        return data
+        """Every number of the gears and designs."""
+        file, mesh, evaluations = self.design, self.mesh, self.evaluations
+        pair = mesh.pair.coast if file.coast else mesh.pair  # of the hands that the file has
+        ppte = {UnitKey(name, "um"): evaluation.ppte for name, evaluation in evaluations.items()}
+        geometry = gears(file)["geometry"]
+        return {
+            "gears": {
+                name: _gear(getattr(pair, name), geometry[name]) | _drawn(drawn) for name, drawn in file.drawn.items()
+            },
+            UnitKey("center_distance", "mm"): geometry["pair"]["center_distance_mm"],
+            **_misalignment(mesh),
+            "designs": {
+                name: {**_design(evaluations[name]), "findings": [finding_data(finding) for finding in several]}
+                for name, several in self.unusual.items()
+            },
+            UnitKey("ppte_reduction", "%"): _reduction(evaluations),
+            "ppte_over_torque": {UnitKey("torque", "N m"): self.torques, **ppte},
+            "iso_6336": self._rating(),
+        }
+
+    def _rating(self) -> dict[str, dict[str, float]]:
+        return {name: {key: of.factors[key] for key in FACTORS} for name, of in self.evaluations.items()}
 
     def write(self, folder: Path) -> None:
-        """The flanks of all designs as `flanks.csv`, and a front as `front.csv`."""
+        """The flanks of all designs as `flanks.csv`."""
         write_flanks(folder / "flanks.csv", self.mesh, side_by_side.flanks(self.evaluations))
-        if self.front is not None:
-            write_front(folder / "front.csv", self.front)
 
-    def figures(self) -> dict[str, Any]:
-        """Designs, their scatter over manufactured gears, and the search."""
-        axes = side_by_side.figures(self.design, self.mesh, self.evaluations, self.torques)
-        axes |= manufactured.figures(self.evaluations)
-        if self.optimum is not None:
-            of = self.mesh, self.design.torque, self.optimum, self.front, self.evaluations
-            axes |= optimum_report.figures(*of)
-        return axes
-
-    def headlines(self) -> Iterator[Table]:
-        """Summary tables of an optimization, shown before all others; none without an optimum."""
-        if self.optimum is not None:
-            found = self.optimum, self.front, self.projection, self.evaluations
-            yield from optimum_report.first_screen(
-                self.design,
-                *found,
-                searched_at=self.searched_at,
-                unusual=self.unusual[side_by_side.main_name(self.evaluations)],
-                trust=self._trust(),
-            )
-
-    def _trust(self) -> Iterator[tuple[str, str]]:
-        for line in self._not_converged():
-            yield "failed", line
-        yield from (("note", line) for line in self._notes())
-        findings = [line.removeprefix(side_by_side.WARNING) for line in self.findings()]
-        yield from (("warning", line) for line in findings)
-        if not findings:
-            yield "warnings", _USUAL
+    def figures(self) -> Iterator[Figure]:
+        """Designs, and their scatter over manufactured gears."""
+        yield from side_by_side.figures(self.design, self.mesh, self.evaluations, self.torques)
+        yield from manufactured.figures(self.evaluations)
 
     def tables(self) -> Iterator[Table]:
-        """The designs side by side, and those of a front."""
+        """The designs side by side."""
         yield side_by_side.table(self.design, self.evaluations)
-        if self.front is not None:
-            yield front_table(self.front, self.evaluations, self.design.units)
 
     def verdict(self) -> Iterator[str]:
-        """The results in words, where there is no optimum that says them first."""
-        if self.optimum is None:
-            yield from (*side_by_side.grid(self.evaluations), *self._notes())
-        yield mounting(self.design)
+        """The grid and its error, notes, and how the gears are mounted."""
+        yield from (*side_by_side.grid(self.evaluations), *self.notes(), mounting(self.design))
 
-    def _notes(self) -> Iterator[str]:
+    def notes(self) -> Iterator[str]:
+        """Manufactured gears, coast flanks, coarse positions and missing verification in words."""
         yield from manufactured.lines(self.design, self.evaluations)
         if self.design.coast:
             yield "coast flanks: contact runs from pinion tip to pinion root, positions count against the rotation"
@@ -115,24 +111,78 @@ class ComparisonResult(AbstractStudyResult):
         if self.unverified:
             yield f"not verified by finite elements: {self.unverified}"
 
-    def details(self) -> Iterator[str]:
-        """How a search has gone."""
-        if self.optimum is not None:
-            yield from optimum_report.search_lines(self.optimum, self.front, self.projection)
-
     def findings(self) -> Iterator[str]:
         """Values of the designs out of the usual range."""
         return side_by_side.finding_lines(self.unusual)
 
     def failures(self) -> Iterator[str]:
-        """Results that did not converge, and limits that are not met."""
-        yield from self._not_converged()
-        if self.optimum is not None and not self.optimum.feasible:
-            yield "constraints are not met"
-
-    def _not_converged(self) -> Iterator[str]:
+        """Results that did not converge."""
         yield from (*side_by_side.failures(self.evaluations), *manufactured.failures(self.evaluations))
 
-    def chapters(self) -> list[Chapter]:
-        """Robustness, where the file has tolerances."""
-        return manufactured.pages(self.design, self.evaluations)
+    def checks(self) -> Iterator[tuple[str, str]]:
+        """Convergence of all designs, and their numbers by finite elements."""
+        for name, evaluation in self.evaluations.items():
+            yield f"{name}: converged", text(evaluation.metrics["converged"])
+            yield f"{name}: failed torques [N m]", text(evaluation.failed_torques)
+            if evaluation.verified is not None:
+                for key, value in numbers(_verified(evaluation.verified)):
+                    yield f"{name}: by finite elements, {key}", value
+
+    def chapters(self) -> Iterator[Chapter]:
+        """Robustness, where the file has tolerances, and the rating by ISO 6336."""
+        yield from manufactured.pages(self.design, self.evaluations)
+        yield rating_page(self._rating())
+
+
+def _design(evaluation: Evaluation) -> dict[str, Any]:
+    return {
+        **evaluation.metrics,
+        "change_at_twice_the_positions": evaluation.grid_change,
+        **({"objectives": evaluation.objectives} if evaluation.objectives else {}),
+        **({"verified": _verified(evaluation.verified)} if evaluation.verified else {}),
+        **manufactured.summary(evaluation),
+        UnitKey("failed_torques", "N m"): evaluation.failed_torques,
+        **flanks_data(evaluation.pinion, evaluation.wheel),
+        UnitKey("time", "s"): evaluation.seconds,
+    }
+
+
+def _verified(found: Verified) -> dict[str, Any]:
+    objectives = {"objectives": found.objectives} if found.objectives else {}
+    return {"structure": "finite_element", quantities["ppte"].key: found.ppte, **objectives}
+
+
+def _reduction(evaluations: side_by_side.Evaluations) -> float:
+    """Reduction of the PPTE of the first design, which is unmodified, by the main design [%]."""
+    before = next(iter(evaluations.values())).metrics["ppte_um"]
+    return 100 * (1 - side_by_side.main(evaluations).metrics["ppte_um"] / before) if before else 0.0
+
+
+_DERIVED = "tip_diameter", "tip_form_diameter", "bore_diameter"  # follow from other numbers where none are given
+
+
+def _gear(gear: Gear, geometry: Mapping[str, Any]) -> dict[str, Any]:
+    """Every number of a gear, with those that follow from others where the file gives none."""
+    data: dict[str, Any] = {"bore_given": gear.bore_diameter is not None}
+    for part in (gear, gear.material):
+        for name, field in fields_of(type(part)).items():
+            key = key_of(name, field)
+            data[key] = geometry[key] if name in _DERIVED else np.asarray(getattr(part, name))
+    return data
+
+
+def _drawn(given: Mapping[str, Any]) -> dict[str, Any]:
+    """Drawing data of the file with `drawn_` before tooth thickness keys, to tell them from the numbers of the gear."""
+    return {
+        UnitKey(f"drawn_{key.name}", key.unit)
+        if isinstance(key, UnitKey) and key.startswith("tooth_thickness")
+        else key: value
+        for key, value in given.items()
+    }
+
+
+def _misalignment(mesh: Mesh) -> dict[str, float]:
+    """Misalignment over the face where the axes are not parallel [um]."""
+    if not isinstance(mesh.support, RigidSupport):
+        return {}
+    return {UnitKey("misalignment", "um"): float(mesh.support.misalignment.over_face(mesh.pair))}

@@ -1,9 +1,9 @@
 """Result of a speed study: tables, text, figures and files."""
 
-import csv
 import dataclasses
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -14,11 +14,13 @@ from ..contact.status import reason
 from ..dynamics import DOWN, KICKED, UP, Branch, Dynamics, Oscillator, RunUp, SpeedResponse, inertia_of, motion
 from ..dynamics.response import FORCE_REFERENCE
 from ..io import DesignFile
+from ..io.results import write_csv
 from ..microgeometry import AbstractModification
-from ..report import Table
+from ..numerics import UnitKey
+from ..report import Figure, Record, Table, numbers_of, table_of
 from .evaluation import grid_lines
 from .study import AbstractStudyResult
-from .summary_data import flanks_data, model
+from .summary_data import fields_data, flanks_data, model
 
 _COLUMNS = {
     "dynamic_factor": "dynamic_factor",
@@ -31,9 +33,24 @@ _COLUMNS = {
     "period": "period_mesh_cycles",
     "converged": "settled",
 }
+_RUN_UP = "dynamic_factor", "dte_min", "dte_max"  # columns of a run-up
+_OVER_SPEED = {
+    "dynamic_factor": "Dynamic factor over the mesh frequency, speed going up and down.",
+    "dte_rms": "Root mean square of the dynamic transmission error about its mean over the mesh frequency.",
+}
+_RUN_UP_CAPTION = "Largest mesh force over the static one while the speed rises at constant acceleration."
+_CLOSER = {
+    "waterfall": "Campbell diagram: amplitudes of the mesh force by order over the mesh frequency.",
+    "order_tracks": "Level of the orders of the mesh force over the mesh frequency, rms values re 1 µN (ISO 1683).",
+    "bifurcation": "Dynamic transmission error once per mesh cycle over the mesh frequency (bifurcation diagram).",
+    "phase_portrait": "Dynamic transmission error and its rate at the speed of the largest dynamic factor; marked once "
+    "per mesh cycle. The abscissae differ from panel to panel.",
+}
 _FAR = 20.0  # times the natural frequency, above which, or below its reciprocal, nothing of a mesh resonates
 _RUNS = {UP: "rising", DOWN: "falling", KICKED: "falling, kicked"}
 _PANEL, _HEIGHT, _WIDE = 92.0, 94.0, 130.0  # [mm]
+
+_Run = tuple[str, float, str, SpeedResponse]  # design, torque [N m], name of the run, response
 
 
 @dataclass(frozen=True)
@@ -75,7 +92,7 @@ class DynamicsResult(AbstractStudyResult):
     run_ups: Mapping[str, Mapping[float, RunUp]]
     grid_change: Mapping[str, Mapping[str, float]] = dataclasses.field(default_factory=dict)
 
-    def rows(self) -> Iterator[tuple[str, float, str, SpeedResponse]]:
+    def rows(self) -> Iterator[_Run]:
         """Design, torque, run and response of all runs."""
         for name, of_torques in self.responses.items():
             for torque, runs in of_torques.items():
@@ -87,22 +104,43 @@ class DynamicsResult(AbstractStudyResult):
         """The torque next to the design torque [N m]."""
         return next_to_design(self.design, self.torques)
 
+    def _records(self) -> tuple[Record[_Run], ...]:
+        """Numbers of a run, in the order of the table."""
+
+        def top(field: str, place: int) -> Callable[[_Run], float]:
+            return lambda run: peak(run[-1], field)[place]
+
+        return (
+            Record("torque", "N m", lambda run: run[1], "", "g"),
+            Record(
+                "natural_frequency",
+                "Hz",
+                lambda run: self.natural_frequencies[run[0]][run[1]],
+                "f_n [Hz]",
+                ".0f",
+            ),
+            Record("speed", "", lambda run: run[2], "", "s"),
+            Record("max_dynamic_factor", "", top("dynamic_factor", 0), "K_v"),
+            Record("at_dynamic_factor", "Hz", top("dynamic_factor", 1), "at [Hz]", ".0f"),
+            Record("max_dte_rms", "um", top("dte_rms", 0), "DTE rms [um]", ".2f"),
+            Record("at_dte_rms", "Hz", top("dte_rms", 1), "at [Hz]", ".0f"),
+            Record(
+                "max_no_contact_share",
+                "",
+                top("contact_loss_share", 0),
+                "contact loss [%]",
+                lambda share: f"{100 * share:.1f}",
+            ),
+            Record("max_coast_contact_share", "", top("back_side_contact", 0)),
+            Record("speeds_without_period", "", lambda run: int(np.sum(np.asarray(run[-1].period) == 0))),
+        )
+
     def tables(self) -> Iterator[Table]:
         """The peaks of every run."""
-        peaks = "K_v", "at [Hz]", "DTE rms [um]", "at [Hz]", "contact loss [%]"
-        header = "design", "torque [N m]", "f_n [Hz]", "speed", *peaks
-        result = Table(header, title=f"{self.design.title}: largest values over the speed")
-        before = None
-        for name, torque, run, response in self.rows():
-            if before not in (None, name):
-                result.add_section()
-            (factor, at_factor), (rms, at_rms) = peak(response, "dynamic_factor"), peak(response, "dte_rms")
-            apart = 100 * peak(response, "contact_loss_share")[0]
-            numbers = f"{factor:.3f}", f"{at_factor:.0f}", f"{rms:.2f}", f"{at_rms:.0f}", f"{apart:.1f}"
-            natural = self.natural_frequencies[name][torque]
-            result.add_row(name, f"{torque:g}", f"{natural:.0f}", run, *numbers)
-            before = name
-        yield result
+        rows = [(run[0], run) for run in self.rows()]
+        table = table_of(self._records(), rows, f"{self.design.title}: largest values over the speed", "design")
+        table.ends = tuple(place for place in range(len(rows) - 1) if rows[place][0] != rows[place + 1][0])
+        yield table
 
     def verdict(self) -> Iterator[str]:
         """The worst of every design over all runs and torques."""
@@ -179,130 +217,119 @@ class DynamicsResult(AbstractStudyResult):
                     "Raise resolution.newton_steps, or resolution.pairs where the deflection is large."
                 )
 
-    def summary(self) -> dict[str, Any]:
-        """The runs of all designs, with what vibrates."""
-        settings = self.settings
-        given = {field.name: getattr(settings, field.name) for field in dataclasses.fields(settings)}
+    def inputs(self) -> dict[str, Any]:
+        """Torques, speeds, settings, equivalent mass and model."""
+        given = fields_data(self.settings)
         frequencies = np.asarray(given.pop("mesh_frequencies"))
-        designs: dict[str, Any] = {}
-        for name, (pinion, wheel) in self.designs.items():
-            runs = [
-                {
-                    "torque_Nm": torque,
-                    "speed": run,
-                    "natural_frequency_Hz": self.natural_frequencies[name][torque],
-                    **_peaks(response),
-                }
-                for other, torque, run, response in self.rows()
-                if other == name
-            ]
-            designs[name] = {"runs": runs, **flanks_data(pinion, wheel)}
-            if name in self.grid_change:
-                designs[name]["change_at_twice_the_positions_and_steps"] = self.grid_change[name]
-            if self.run_ups:
-                of_torques = {torque: peak(of, "dynamic_factor") for torque, of in self.run_ups[name].items()}
-                designs[name]["run_ups"] = [
-                    {"torque_Nm": torque, "max_dynamic_factor": factor, "at_dynamic_factor_Hz": at}
-                    for torque, (factor, at) in of_torques.items()
-                ]
         return {
-            "torques_Nm": self.torques,
-            "mesh_frequencies_Hz": [float(frequencies[0]), float(frequencies[-1])],
+            UnitKey("torques", "N m"): self.torques,
+            UnitKey("mesh_frequencies", "Hz"): [float(frequencies[0]), float(frequencies[-1])],
             "speeds": len(frequencies),
-            **({} if self.run_up is None else {"run_up_s": self.run_up}),
-            "force_level_reference_N": FORCE_REFERENCE,
-            "settings": {name: value for name, value in given.items() if value is not None},
-            "equivalent_mass_kg": np.asarray(self.oscillators["unmodified"][self.torque].mass),
+            "settings": given,
+            UnitKey("equivalent_mass", "kg"): np.asarray(self.oscillators["unmodified"][self.torque].mass),
+            "model": model(self.mesh),
+        }
+
+    def summary(self) -> dict[str, Any]:
+        """The runs of all designs."""
+        records = self._records()
+        designs: dict[str, Any] = {name: {"runs": [], **flanks_data(*flanks)} for name, flanks in self.designs.items()}
+        for run in self.rows():
+            designs[run[0]]["runs"].append(numbers_of(records, run))
+        for name, change in self.grid_change.items():
+            designs[name]["change_at_twice_the_positions_and_steps"] = change
+        for name, of_torques in self.run_ups.items():
+            keys = UnitKey("torque", "N m"), UnitKey("max_dynamic_factor"), UnitKey("at_dynamic_factor", "Hz")
+            peaks = ((torque, *peak(of, "dynamic_factor")) for torque, of in of_torques.items())
+            designs[name]["run_ups"] = [dict(zip(keys, each)) for each in peaks]
+        return {
+            **({} if self.run_up is None else {UnitKey("run_up", "s"): self.run_up}),
+            UnitKey("force_level_reference", "N"): FORCE_REFERENCE,
             "steps": [min(self.steps), max(self.steps)],
             "designs": designs,
             "branches_of_unmodified": [_branch(branch) for branch in self.branches],
-            "model": model(self.mesh),
         }
 
     def write(self, folder: Path) -> None:
         """Every speed of every run as `responses.csv`, and every sample of every run-up as `run_up.csv`."""
-        self._write_responses(folder / "responses.csv")
+        orders = next(self.rows())[-1].orders
+        of_orders = [f"force_order_{order:g}_{unit}" for unit in ("N", "dB_re_1uN") for order in orders]
+        begin = "design", "torque_Nm", "speed", "mesh_frequency_Hz", "pinion_speed_rpm"
+        write_csv(folder / "responses.csv", [*begin, *_COLUMNS.values(), *of_orders], self._speeds())
         if self.run_ups:
-            self._write_run_ups(folder / "run_up.csv")
+            header = "time_s", "mesh_frequency_Hz", "pinion_speed_rpm", *(_COLUMNS[name] for name in _RUN_UP)
+            write_csv(folder / "run_up.csv", ["design", "torque_Nm", *header], self._samples())
 
-    def _write_run_ups(self, path: Path) -> None:
-        """Every sample of every run-up."""
-        per_hertz = 60 / float(self.mesh.pair.pinion.teeth)
-        fields = {"time": "time_s", "mesh_frequency": "mesh_frequency_Hz"}
-        others = {name: _COLUMNS[name] for name in ("dynamic_factor", "dte_min", "dte_max")}
-        with path.open("w", newline="", encoding="utf-8") as file:
-            writer = csv.writer(file)
-            writer.writerow(["design", "torque_Nm", *fields.values(), "pinion_speed_rpm", *others.values()])
-            for name, of_torques in self.run_ups.items():
-                for torque, of in of_torques.items():
-                    at = [np.asarray(getattr(of, field)) for field in fields]
-                    columns = [*at, per_hertz * at[1], *(np.asarray(getattr(of, field)) for field in others)]
-                    for values in zip(*columns):
-                        writer.writerow([name, f"{torque:g}", *(f"{value:.7g}" for value in values)])
+    def _speeds(self) -> Iterator[tuple[Any, ...]]:
+        """Rows of `responses.csv`."""
+        for name, torque, run, response in self.rows():
+            columns = [np.asarray(getattr(response, field)) for field in _COLUMNS]
+            columns += [*np.asarray(response.force_harmonics).T, *np.asarray(response.force_levels).T]
+            frequency = np.asarray(response.mesh_frequency)
+            for row in zip(frequency, frequency * self._per_hertz, *columns):
+                yield name, f"{torque:g}", run, *row
 
-    def _write_responses(self, path: Path) -> None:
-        """Every speed of every run."""
-        with path.open("w", newline="", encoding="utf-8") as file:
-            writer = csv.writer(file)
-            begin = "design", "torque_Nm", "speed", "mesh_frequency_Hz", "pinion_speed_rpm"
-            orders = next(self.rows())[-1].orders
-            of_orders = [f"force_order_{order:g}_{unit}" for unit in ("N", "dB_re_1uN") for order in orders]
-            writer.writerow([*begin, *_COLUMNS.values(), *of_orders])
-            per_hertz = 60 / float(self.mesh.pair.pinion.teeth)
-            for name, torque, run, response in self.rows():
-                columns = [np.asarray(getattr(response, field)) for field in _COLUMNS]
-                columns += [*np.asarray(response.force_harmonics).T, *np.asarray(response.force_levels).T]
-                for frequency, *values in zip(np.asarray(response.mesh_frequency), *columns):
-                    numbers = [int(value) if value.dtype.kind in "ib" else f"{value:.7g}" for value in values]
-                    speed = f"{frequency:.7g}", f"{frequency * per_hertz:.7g}"
-                    writer.writerow([name, f"{torque:g}", run, *speed, *numbers])
+    def _samples(self) -> Iterator[tuple[Any, ...]]:
+        """Rows of `run_up.csv`."""
+        for name, of_torques in self.run_ups.items():
+            for torque, of in of_torques.items():
+                frequency = np.asarray(of.mesh_frequency)
+                others = (np.asarray(getattr(of, field)) for field in _RUN_UP)
+                for row in zip(np.asarray(of.time), frequency, self._per_hertz * frequency, *others):
+                    yield name, f"{torque:g}", *row
 
-    def figures(self) -> dict[str, Any]:
+    @property
+    def _per_hertz(self) -> float:
+        """Speed of the pinion over the mesh frequency [rpm/Hz]."""
+        return 60 / float(self.mesh.pair.pinion.teeth)
+
+    def figures(self) -> Iterator[Figure]:
         """Responses of all designs, and the first and the last design more closely."""
         from .. import plot
 
-        torques = self.torques
-        size: dict[str, Any] = {"columns": len(torques), "width": _PANEL * len(torques), "height": _HEIGHT}
-        axes: dict[str, Any] = {}
-        for field in ("dynamic_factor", "dte_rms"):
-            with plot.figure.report_axes(None, **size) as panels:
-                for number, (panel, torque) in enumerate(zip(np.ravel(panels), torques)):
-                    runs = {name: _called(of[torque]) for name, of in self.responses.items()}
-                    plot.speed_response(runs, field, panel, title=f"{torque:g} N m")
-                    self._finish(panel, number)
-            axes[field] = panels
+        for field, caption in _OVER_SPEED.items():
+
+            def respond(panel: Any, torque: float, field: Any = field) -> None:
+                runs = {name: _called(of[torque]) for name, of in self.responses.items()}
+                plot.speed_response(runs, field, panel, title=f"{torque:g} N m")
+
+            yield Figure(field, caption, self._panels(respond, self.torques))
         if self.run_ups:
-            with plot.figure.report_axes(None, **size) as panels:
-                for number, (panel, torque) in enumerate(zip(np.ravel(panels), torques)):
-                    risen = {name: {"rising": of[torque]} for name, of in self.run_ups.items()}
-                    plot.speed_response(risen, ax=panel, title=f"{torque:g} N m, rising in {self.run_up:g} s")
-                    self._finish(panel, number)
-            axes["run_up"] = panels
-        shown = list(dict.fromkeys((next(iter(self.designs)), list(self.designs)[-1])))
-        size = {"columns": len(shown), "width": _PANEL * len(shown), "height": _HEIGHT}
-        for kind in ("waterfall", "order_tracks", "bifurcation", "phase_portrait"):
-            with plot.figure.report_axes(None, **size) as panels:
-                for number, (panel, name) in enumerate(zip(np.ravel(panels), shown)):
-                    self._draw(kind, panel, name)
-                    self._finish(panel, number)
-            axes[kind] = panels
+
+            def rise(panel: Any, torque: float) -> None:
+                risen = {name: {"rising": of[torque]} for name, of in self.run_ups.items()}
+                plot.speed_response(risen, ax=panel, title=f"{torque:g} N m, rising in {self.run_up:g} s")
+
+            yield Figure("run_up", _RUN_UP_CAPTION, self._panels(rise, self.torques))
+        shown = dict.fromkeys((next(iter(self.designs)), list(self.designs)[-1]))
+        for kind, caption in _CLOSER.items():
+            yield Figure(kind, caption, self._panels(partial(self._draw, kind), shown))
         if self.branches:
             swept = list(self.responses["unmodified"][self.torque].values())
             title = f"unmodified, {self.torque:g} N m"
             with plot.figure.report_axes(None, width=_WIDE, height=_HEIGHT) as axis:
-                axes["branches"] = plot.branches(self.branches, ax=axis, responses=swept, title=title)
-                self._finish(axis, 0)
-        return axes
+                figure = Figure.of(plot.branches, self.branches, ax=axis, responses=swept, title=title)
+                self._scale(axis)
+            yield figure
 
-    def _finish(self, panel, number: int) -> None:
-        """One name of the ordinate for all panels, and speeds beside mesh frequencies."""
+    def _panels(self, draw: Callable[[Any, Any], None], each: Iterable[Any]) -> Any:
+        """Panels side by side."""
         from .. import plot
 
-        panel.set_ylabel(panel.get_ylabel() if number == 0 else "")
+        def scaled(panel: Any, shown: Any) -> None:
+            draw(panel, shown)
+            self._scale(panel)
+
+        return plot.panels(scaled, each, width=_PANEL, height=_HEIGHT)
+
+    def _scale(self, panel: Any) -> None:
+        """Speeds beside mesh frequencies."""
+        from .. import plot
+
         if panel.get_xlabel() == plot.dynamics.FREQUENCY_LABEL:
             plot.speed_scale(panel, float(self.mesh.pair.pinion.teeth))
 
-    def _draw(self, kind: str, panel, name: str) -> None:
+    def _draw(self, kind: str, panel: Any, name: str) -> None:
         from .. import plot
 
         runs = self.responses[name][self.torque]
@@ -351,21 +378,12 @@ def peak(response: SpeedResponse | RunUp, field: str) -> tuple[float, float]:
 
 
 def _branch(branch: Branch) -> dict[str, Any]:
+    frequency = UnitKey("mesh_frequency", "Hz")
     bifurcations = [
-        {"kind": one.kind, "mesh_frequency_Hz": float(one.parameter), "dynamic_factor": float(one.orbit.dynamic_factor)}
+        {"kind": one.kind, frequency: float(one.parameter), "dynamic_factor": float(one.orbit.dynamic_factor)}
         for one in branch.bifurcations
     ]
     return {"period_mesh_cycles": branch.orbits.periods, "ended": branch.ended, "bifurcations": bifurcations}
-
-
-def _peaks(response: SpeedResponse) -> dict[str, float]:
-    found: dict[str, float] = {}
-    for name, column in (("dynamic_factor", "dynamic_factor"), ("dte_rms", "dte_rms_um")):
-        found[f"max_{column}"], found[f"at_{name}_Hz"] = peak(response, name)
-    found["max_no_contact_share"] = peak(response, "contact_loss_share")[0]
-    found["max_coast_contact_share"] = peak(response, "back_side_contact")[0]
-    found["speeds_without_period"] = int(np.sum(np.asarray(response.period) == 0))
-    return found
 
 
 def _called(runs: Mapping[str, SpeedResponse]) -> dict[str, SpeedResponse]:

@@ -10,7 +10,7 @@ import numpy as np
 from ..contact.status import reason
 from ..dynamics.mesh_tables import FILES, MeshTables, mesh_tables
 from ..io import DesignFile, Search
-from ..numerics import changed
+from ..numerics import UnitKey, changed
 from ..report import Table
 from .checkpoints import Checkpoints
 from .comparison import Modifications, compared, search_of
@@ -77,17 +77,16 @@ class ExportResult(AbstractStudyResult):
     flanks: Modifications
     mesh: MeshTables
 
-    def tables(self) -> list[Table]:
+    def tables(self) -> Iterator[Table]:
         """Numbers at the torque of the file and at both ends of its range."""
         header = "torque\n[N m]", "mean TE\n[um]", "PPTE\n[um]", "mesh order\n[um]", "mean stiffness\n[N/um]"
-        result = Table(header, title=f"{self.design.title}: {self.name} design")
-        mesh = self.mesh
+        result, mesh = Table(header, title=f"{self.design.title}: {self.name} design"), self.mesh
         for torque in sorted({mesh.torques[0], mesh.torque, mesh.torques[-1]}):
             at = int(np.searchsorted(mesh.torques, torque))
             error = mesh.transmission_error[at]
             numbers = error.mean(), np.ptp(error), mesh.amplitude[at, 0]
             result.add_row(f"{torque:g}", *(f"{each:.3f}" for each in numbers), f"{mesh.stiffness[at].mean():.1f}")
-        return [result]
+        yield result
 
     def failures(self) -> Iterator[str]:
         """A line where the contact was not found somewhere."""
@@ -96,18 +95,22 @@ class ExportResult(AbstractStudyResult):
             help_ = "Raise resolution.newton_steps or resolution.pairs."
             yield f"NOT CONVERGED: {self.name}, {cause}; the tables are not written. {help_}"
 
+    def inputs(self) -> dict[str, Any]:
+        """Torques and equivalent mass."""
+        return {
+            UnitKey("torque", "N m"): self.mesh.torque,
+            UnitKey("torques", "N m"): self.mesh.torques,
+            UnitKey("equivalent_mass", "kg"): self.mesh.equivalent_mass,
+        }
+
     def summary(self) -> dict[str, Any]:
         """Scalars of the tables; the tables are files of their own."""
-        mesh = self.mesh
-        speed = self.design.speed
-        return {
-            "torque_Nm": mesh.torque,
+        mesh, speed = self.mesh, self.design.speed
+        data = {} if speed is None else {UnitKey("mesh_frequency", "Hz"): float(mesh.teeth[0] * speed / 60)}
+        return data | {
             "design": self.name,
-            **({} if speed is None else {"mesh_frequency_Hz": float(mesh.teeth[0] * speed / 60)}),
-            "base_radius_mm": mesh.base_radius,
-            "inertia_kgm2": mesh.inertia,
-            "equivalent_mass_kg": mesh.equivalent_mass,
-            "torques_Nm": mesh.torques,
+            UnitKey("base_radius", "mm"): mesh.base_radius,
+            UnitKey("inertia", "kg m2"): mesh.inertia,
             "files": list(FILES) if mesh.converged else [],
             **flanks_data(*self.flanks),
         }

@@ -1,7 +1,7 @@
 """The geometry of a pair as an engineer lists it, and as a drawing says it."""
 
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -13,22 +13,29 @@ from ..geometry.gear import has_full_radius, tool_name
 from ..io import DesignFile
 from ..io.tolerance_table import quality_classes
 from ..manufacture import measures
-from ..numerics import Given, changed, program
-from ..report import Chapter, Table, heading, text
+from ..numerics import Given, UnitKey, changed, program
+from ..report import Chapter, Table, text
 from ..tolerance import ToleranceClass, iso_rounded
+from ..vocabulary import quantities
+
+
+def _symbol(name: str, unit: str, symbol: str) -> UnitKey:
+    """Key of a number that has a symbol in the standards."""
+    words = quantities[name].words if name in quantities else name.replace("_", " ")
+    return UnitKey(name, unit, words if words.endswith(symbol) else f"{words}, {symbol}")
+
 
 _CHOSEN = "teeth_spanned", "ball_diameter_mm"  # by a file, or by `measures`
-# numbers and the symbols of the standards, in the order of the tables
-_MEASURES = {
-    "teeth_spanned": "k",
-    "span_upper_limit_mm": "W_k",
-    "span_lower_limit_mm": "W_k",
-    "ball_diameter_mm": "D_M",
-    "over_balls_upper_limit_mm": "M_dK",
-    "over_balls_lower_limit_mm": "M_dK",
-}
-_CLASS = "flank_tolerance_class"
-_DEVIATIONS = {
+_MEASURES = (
+    _symbol("teeth_spanned", "", "k"),
+    _symbol("span_upper_limit", "mm", "W_k"),
+    _symbol("span_lower_limit", "mm", "W_k"),
+    _symbol("ball_diameter", "mm", "D_M"),
+    _symbol("over_balls_upper_limit", "mm", "M_dK"),
+    _symbol("over_balls_lower_limit", "mm", "M_dK"),
+)
+_CLASS = UnitKey("flank_tolerance_class")
+_SYMBOLS = {
     "single_pitch": "f_p",
     "total_pitch": "F_p",
     "profile_slope": "f_Halpha",
@@ -38,29 +45,25 @@ _DEVIATIONS = {
     "helix_form": "f_fbeta",
     "helix_total": "F_beta",
 }
-_FACTORS = {
-    "tangential_force_N": "F_t",
-    "face_load_factor": "K_Hbeta",
-    "zone_factor": "Z_H",
-    "elasticity_factor_sqrt_MPa": "Z_E",
-    "contact_ratio_factor": "Z_epsilon",
-    "helix_angle_factor": "Z_beta",
-    "nominal_contact_stress_MPa": "sigma_H0",
-    "pinion_single_pair_contact_factor": "Z_B",
-    "wheel_single_pair_contact_factor": "Z_D",
-    "pinion_contact_stress_MPa": "sigma_H",
-    "wheel_contact_stress_MPa": "sigma_H",
-    "root_face_load_factor": "K_Fbeta",
-    "root_helix_angle_factor": "Y_beta",
-    "pinion_form_factor": "Y_F",
-    "wheel_form_factor": "Y_F",
-    "pinion_stress_correction_factor": "Y_S",
-    "wheel_stress_correction_factor": "Y_S",
-    "pinion_nominal_root_stress_MPa": "sigma_F0",
-    "wheel_nominal_root_stress_MPa": "sigma_F0",
-    "pinion_root_stress_MPa": "sigma_F",
-    "wheel_root_stress_MPa": "sigma_F",
-}
+_DEVIATIONS = {name: _symbol(f"{name}_deviation", "um", symbol) for name, symbol in _SYMBOLS.items()}
+FACTORS = (
+    _symbol("tangential_force", "N", "F_t"),
+    _symbol("face_load_factor", "", "K_Hbeta"),
+    _symbol("zone_factor", "", "Z_H"),
+    _symbol("elasticity_factor", "MPa^0.5", "Z_E"),
+    _symbol("contact_ratio_factor", "", "Z_epsilon"),
+    _symbol("helix_angle_factor", "", "Z_beta"),
+    _symbol("nominal_contact_stress", "MPa", "sigma_H0"),
+    _symbol("pinion_single_pair_contact_factor", "", "Z_B"),
+    _symbol("wheel_single_pair_contact_factor", "", "Z_D"),
+    *(_symbol(f"{gear}_contact_stress", "MPa", "sigma_H") for gear in ("pinion", "wheel")),
+    _symbol("root_face_load_factor", "", "K_Fbeta"),
+    _symbol("root_helix_angle_factor", "", "Y_beta"),
+    *(_symbol(f"{gear}_form_factor", "", "Y_F") for gear in ("pinion", "wheel")),
+    *(_symbol(f"{gear}_stress_correction_factor", "", "Y_S") for gear in ("pinion", "wheel")),
+    *(_symbol(f"{gear}_nominal_root_stress", "MPa", "sigma_F0") for gear in ("pinion", "wheel")),
+    *(_symbol(f"{gear}_root_stress", "MPa", "sigma_F") for gear in ("pinion", "wheel")),
+)
 _RATING_NOTE = (
     "Application factor, dynamic factor and transverse load factor are 1 here: load_factor of [strength] takes them "
     "into safeties and damages, that of [lubricant] into friction, flash temperature and film. Y_B and Y_DT are 1, for "
@@ -100,86 +103,113 @@ def numbers(
 
 
 def drawing(found: tuple[tuple[Any, ...], ...], quality: ToleranceClass | None) -> dict[str, Any]:
-    """`numbers` of a gear by name and unit; what would miss the involute is left out."""
+    """`numbers` of a gear by name and unit; measures that would miss the involute are left out."""
     measured, deviations = ([np.asarray(number).item() for number in several] for several in found)
-    data: dict[str, Any] = {name: value for name, value in zip(_MEASURES, measured) if np.isfinite(value)}
-    data["teeth_spanned"] = int(data["teeth_spanned"])
+    data: dict[str, Any] = {key: value for key, value in zip(_MEASURES, measured) if np.isfinite(value)}
+    data[_MEASURES[0]] = int(data[_MEASURES[0]])
     if quality is not None:
         data[_CLASS] = int(quality.quality_class)
-    return data | {f"{name}_deviation_um": value for name, value in zip(_DEVIATIONS, deviations)}
+    return data | dict(zip(_DEVIATIONS.values(), deviations))
 
 
-def drawing_table(found: Mapping[str, Mapping[str, Any]]) -> Table:
-    """`drawing` as a table of the report."""
-    symbols = _MEASURES | {_CLASS: ""} | {f"{name}_deviation_um": symbol for name, symbol in _DEVIATIONS.items()}
-    names = [name for name in symbols if any(name in gear for gear in found.values())]
-    rows = tuple((_label(name, symbols), *(text(gear.get(name)) for gear in found.values())) for name in names)
-    return Table(("", *found), rows, "drawing data", _TOLERANCE_NOTE if _CLASS in names else "")
+def gear_tables(data: Mapping[str, Mapping[str, Any]]) -> list[Table]:
+    """`gears` as tables: both gears side by side, the pair, and what stands on a drawing."""
+    geometry, drawn = data["geometry"], data["drawing"]
+    both = {name: geometry[name] for name in ("pinion", "wheel")}
+    known = [key for key in (*_MEASURES, _CLASS, *_DEVIATIONS.values()) if any(key in gear for gear in drawn.values())]
+    note = _TOLERANCE_NOTE if _CLASS in known else ""
+    return [
+        _side_by_side(list(both["pinion"]), both, "gears"),
+        _side_by_side(list(geometry["pair"]), {"pair": geometry["pair"]}, "pair"),
+        _side_by_side(known, drawn, "drawing data", note),
+    ]
 
 
 def rating_page(designs: Mapping[str, Factors]) -> Chapter:
     """The factors of ISO 6336 of several designs, side by side."""
-    rows = tuple((_label(name, _FACTORS), *(text(each[name]) for each in designs.values())) for name in _FACTORS)
-    return Chapter("Rating by ISO 6336", tables=[Table(("", *designs), rows, note=_RATING_NOTE)])
+    return Chapter("Rating by ISO 6336", tables=[_side_by_side(FACTORS, designs, "", _RATING_NOTE)])
 
 
-def _label(name: str, symbols: Mapping[str, str]) -> str:
-    """A number in words, with its symbol and unit."""
-    words, bracket, unit = heading(name).partition(" [")
-    symbol = "" if words.endswith(symbols[name]) else f", {symbols[name]}"
-    return f"{words}{symbol}{bracket}{unit}"
+def _side_by_side(
+    keys: Sequence[UnitKey], columns: Mapping[str, Mapping[str, Any]], title: str, note: str = ""
+) -> Table:
+    """Numbers of several things, a line each."""
+    rows = tuple((key.heading, *(text(of.get(key)) for of in columns.values())) for key in keys)
+    return Table(("", *columns), rows, title, note)
 
 
-# the names of ISO 21771 with the unit, in the order of their numbers below
-_GEAR = (
-    "teeth",
-    "module_mm",
-    "pressure_angle_deg",
-    "profile_shift_coefficient",
-    "generating_profile_shift_coefficient",
-    "face_width_mm",
-    "reference_diameter_mm",
-    "pitch_circle_diameter_mm",
-    "base_diameter_mm",
-    "tip_diameter_mm",
-    "tip_form_diameter_mm",
-    "root_diameter_mm",
-    "root_form_diameter_mm",
-    "active_root_diameter_mm",
-    "active_tip_diameter_mm",
-    "bore_diameter_mm",
-    "tip_land_mm",
-    "tip_edge_radius_mm",
-    "tip_clearance_mm",
-    "tooth_thickness_allowance_um",
-    "tooth_thickness_tolerance_um",
-)
-_HELICAL_GEAR = (
-    "helix_angle_deg",
-    "base_helix_angle_deg",
-    "transverse_module_mm",
-    "transverse_pressure_angle_deg",
-    "virtual_number_of_teeth",
-)
-_BACKLASH = "backlash_on_line_of_action_um"
-_PAIR = (
-    "center_distance_mm",
-    "working_pressure_angle_deg",
-    "gear_ratio",
-    "axial_offset_mm",
-    "common_face_width_mm",
-    "base_pitch_mm",
-    "transverse_contact_ratio",
-    "length_of_path_of_contact_mm",
-    "path_of_contact_A_mm",
-    "path_of_contact_B_mm",
-    "path_of_contact_D_mm",
-    "path_of_contact_E_mm",
-    _BACKLASH,
-    "least_backlash_on_line_of_action_um",
-    "largest_backlash_on_line_of_action_um",
-)
-_HELICAL_PAIR = ("overlap_ratio", "total_contact_ratio", "normal_backlash_um")
+class _Meshing(NamedTuple):
+    """A gear, its outline, roll lengths at pitch point and ends of the active profile [mm], and tip clearance."""
+
+    gear: Gear
+    outline: Outline
+    pitch: Scalar
+    active: tuple[Scalar, ...]
+    tip_clearance: Scalar
+
+
+class _Mated(NamedTuple):
+    """A pair, its path of contact and its backlash on the line of action [um]."""
+
+    pair: GearPair
+    path: PathOfContact
+    backlash: Scalar
+
+
+# the names of ISO 21771
+_GEAR: dict[UnitKey, Callable[[_Meshing], Scalar | None]] = {
+    UnitKey("teeth"): lambda of: of.gear.teeth,
+    UnitKey("module", "mm"): lambda of: of.gear.module,
+    UnitKey("pressure_angle", "deg"): lambda of: of.gear.pressure_angle,
+    UnitKey("profile_shift_coefficient"): lambda of: of.gear.profile_shift,
+    UnitKey("generating_profile_shift_coefficient"): lambda of: of.gear.generating_profile_shift,
+    UnitKey("face_width", "mm"): lambda of: of.gear.face_width,
+    UnitKey("reference_diameter", "mm"): lambda of: 2 * of.gear.pitch_radius,
+    UnitKey("pitch_circle_diameter", "mm"): lambda of: diameter(of.gear, of.pitch),
+    UnitKey("base_diameter", "mm"): lambda of: 2 * of.gear.base_radius,
+    UnitKey("tip_diameter", "mm"): lambda of: 2 * of.gear.tip_radius,
+    UnitKey("tip_form_diameter", "mm"): lambda of: 2 * of.gear.tip_form_radius,
+    UnitKey("root_diameter", "mm"): lambda of: 2 * of.gear.root_circle_radius,
+    UnitKey("root_form_diameter", "mm"): lambda of: diameter(of.gear, of.outline.form_roll_length),
+    UnitKey("active_root_diameter", "mm"): lambda of: diameter(of.gear, of.active[0]),
+    UnitKey("active_tip_diameter", "mm"): lambda of: diameter(of.gear, of.active[1]),
+    UnitKey("bore_diameter", "mm"): lambda of: 2 * of.gear.bore_radius,
+    UnitKey("tip_land", "mm"): lambda of: of.gear.tip_land,
+    UnitKey("tip_edge_radius", "mm"): lambda of: of.gear.edge_radius,
+    UnitKey("tip_clearance", "mm"): lambda of: of.tip_clearance,
+    UnitKey("tooth_thickness_allowance", "um"): lambda of: of.gear.tooth_thickness_allowance,
+    UnitKey("tooth_thickness_tolerance", "um"): lambda of: of.gear.tooth_thickness_tolerance,
+}
+_HELICAL_GEAR: dict[UnitKey, Callable[[_Meshing], Scalar | None]] = {
+    UnitKey("helix_angle", "deg"): lambda of: of.gear.helix_angle,
+    UnitKey("base_helix_angle", "deg"): lambda of: jnp.rad2deg(of.gear.base_helix_angle),
+    UnitKey("transverse_module", "mm"): lambda of: of.gear.transverse_module,
+    UnitKey("transverse_pressure_angle", "deg"): lambda of: jnp.rad2deg(of.gear.transverse_pressure_angle),
+    UnitKey("virtual_number_of_teeth"): lambda of: of.gear.virtual_teeth,
+}
+_BACKLASH, _NORMAL_BACKLASH = UnitKey("backlash_on_line_of_action", "um"), UnitKey("normal_backlash", "um")
+_PAIR: dict[UnitKey, Callable[[_Mated], Scalar]] = {
+    UnitKey("center_distance", "mm"): lambda of: of.pair.working_center_distance,
+    UnitKey("working_pressure_angle", "deg"): lambda of: jnp.rad2deg(of.pair.working_pressure_angle),
+    UnitKey("gear_ratio"): lambda of: of.pair.gear_ratio,
+    UnitKey("axial_offset", "mm"): lambda of: of.pair.axial_offset,
+    UnitKey("common_face_width", "mm"): lambda of: of.pair.face_width,
+    UnitKey("base_pitch", "mm"): lambda of: of.path.base_pitch,
+    UnitKey("transverse_contact_ratio"): lambda of: of.path.contact_ratio,
+    UnitKey("length_of_path_of_contact", "mm"): lambda of: of.path.end - of.path.start,
+    UnitKey("path_of_contact_A", "mm"): lambda of: of.path.start,
+    UnitKey("path_of_contact_B", "mm"): lambda of: of.path.inner_single,
+    UnitKey("path_of_contact_D", "mm"): lambda of: of.path.outer_single,
+    UnitKey("path_of_contact_E", "mm"): lambda of: of.path.end,
+    _BACKLASH: lambda of: of.backlash,
+    UnitKey("least_backlash_on_line_of_action", "um"): lambda of: of.pair.backlash_limits[0],
+    UnitKey("largest_backlash_on_line_of_action", "um"): lambda of: of.pair.backlash_limits[1],
+}
+_HELICAL_PAIR: dict[UnitKey, Callable[[_Mated], Scalar]] = {
+    UnitKey("overlap_ratio"): lambda of: of.pair.overlap_ratio,
+    UnitKey("total_contact_ratio"): lambda of: of.path.contact_ratio + of.pair.overlap_ratio,
+    _NORMAL_BACKLASH: lambda of: of.backlash * jnp.cos(of.pair.pinion.base_helix_angle),
+}
 
 
 def gears(file: DesignFile) -> dict[str, dict[str, dict[str, Any]]]:
@@ -195,12 +225,12 @@ def gears(file: DesignFile) -> dict[str, dict[str, dict[str, Any]]]:
     choices = chosen(file)
     pair = file.pair()
     shape, drawn = _numbers(pair, pair_geometry(explicit(pair)), choices)
-    helical = not pair.is_spur
+    of_gear, of_pair = _listed(pair)
     pinion, wheel, together = jax.tree.map(lambda number: np.where(np.abs(number) < 1e-9, 0.0, number), shape)
     geometry = {
-        "pinion": dict(zip((*_GEAR, *_HELICAL_GEAR * helical), pinion, strict=True)),
-        "wheel": dict(zip((*_GEAR, *_HELICAL_GEAR * helical), wheel, strict=True)),
-        "pair": dict(zip((*_PAIR, *_HELICAL_PAIR * helical), together, strict=True)),
+        "pinion": dict(zip(of_gear, pinion, strict=True)),
+        "wheel": dict(zip(of_gear, wheel, strict=True)),
+        "pair": dict(zip(of_pair, together, strict=True)),
     }
     of = zip(("pinion", "wheel"), drawn, choices)
     return {"geometry": geometry, "drawing": {name: drawing(found, given[-1]) for name, found, given in of}}
@@ -221,93 +251,40 @@ def mounting(file: DesignFile) -> str:
     rack = f"; root radius: {', '.join(full)}" if full else ""
     pair = shape["pair"]
     mounted = f"centre distance {float(pair['center_distance_mm']):.6g} mm"
-    helical = "normal_backlash_um" in pair  # as pair.backlash has it
-    name, where = ("normal_backlash_um", "normal to the flanks") if helical else (_BACKLASH, "on the line of action")
+    helical = _NORMAL_BACKLASH in pair  # as pair.backlash has it
+    name, where = (_NORMAL_BACKLASH, "normal to the flanks") if helical else (_BACKLASH, "on the line of action")
     backlash = round(float(pair[name]), 3) + 0.0  # rounding leaves no -0
     return f"bores: {', '.join(texts)}; {mounted}, backlash {where} {backlash:g} um{rack}"
+
+
+def _listed(pair: GearPair) -> tuple[dict[UnitKey, Callable[..., Any]], dict[UnitKey, Callable[..., Any]]]:
+    """Numbers of a gear and of the pair."""
+    return (_GEAR, _PAIR) if pair.is_spur else (_GEAR | _HELICAL_GEAR, _PAIR | _HELICAL_PAIR)
 
 
 @program
 def _numbers(pair: GearPair, geometry: PairGeometry, choices):
     contact, room = geometry.path_of_contact, geometry.margins
-    pitch = contact.pinion_pitch_roll_length, contact.wheel_pitch_roll_length
-    active = (
-        (contact.pinion_roll_length(contact.start), contact.pinion_roll_length(contact.end)),
-        (contact.wheel_roll_length(contact.end), contact.wheel_roll_length(contact.start)),
+    ends = contact.start, contact.end
+    of_gear, of_pair = _listed(pair)
+    placed = (
+        _Meshing(
+            pair.pinion,
+            geometry.outlines[0],
+            contact.pinion_pitch_roll_length,
+            tuple(map(contact.pinion_roll_length, ends)),
+            room.pinion_tip_clearance,
+        ),
+        _Meshing(
+            pair.wheel,
+            geometry.outlines[1],
+            contact.wheel_pitch_roll_length,
+            tuple(map(contact.wheel_roll_length, reversed(ends))),
+            room.wheel_tip_clearance,
+        ),
     )
-    shape = (
-        _gear(pair.pinion, geometry.outlines[0], pitch[0], active[0], room.pinion_tip_clearance),
-        _gear(pair.wheel, geometry.outlines[1], pitch[1], active[1], room.wheel_tip_clearance),
-        _together(pair, contact, room.backlash),
-    )
+    shape = [
+        *(tuple(compute(gear) for compute in of_gear.values()) for gear in placed),
+        tuple(compute(_Mated(pair, contact, room.backlash)) for compute in of_pair.values()),
+    ]
     return shape, [numbers(gear, *given) for gear, given in zip(pair.gears, choices)]
-
-
-def _gear(
-    gear: Gear, outline: Outline, pitch: Scalar, active: tuple[Scalar, Scalar], tip_clearance: Scalar
-) -> tuple[Scalar, ...]:
-    """`_GEAR` and `_HELICAL_GEAR`, of the roll lengths at the pitch point and the ends of the active profile [mm]."""
-    helical = (
-        ()
-        if gear.helix_angle is None
-        else (
-            gear.helix_angle,
-            jnp.rad2deg(gear.base_helix_angle),
-            gear.transverse_module,
-            jnp.rad2deg(gear.transverse_pressure_angle),
-            gear.virtual_teeth,
-        )
-    )
-    return (
-        gear.teeth,
-        gear.module,
-        gear.pressure_angle,
-        gear.profile_shift,
-        gear.generating_profile_shift,
-        gear.face_width,
-        2 * gear.pitch_radius,
-        diameter(gear, pitch),
-        2 * gear.base_radius,
-        2 * gear.tip_radius,
-        2 * gear.tip_form_radius,
-        2 * gear.root_circle_radius,
-        diameter(gear, outline.form_roll_length),
-        *(diameter(gear, end) for end in active),
-        2 * gear.bore_radius,
-        gear.tip_land,
-        gear.edge_radius,
-        tip_clearance,
-        gear.tooth_thickness_allowance,
-        gear.tooth_thickness_tolerance,
-        *helical,
-    )
-
-
-def _together(pair: GearPair, contact: PathOfContact, backlash: Scalar) -> tuple[Scalar, ...]:
-    """`_PAIR` and `_HELICAL_PAIR`."""
-    helical = (
-        ()
-        if pair.pinion.helix_angle is None
-        else (
-            pair.overlap_ratio,
-            contact.contact_ratio + pair.overlap_ratio,
-            backlash * jnp.cos(pair.pinion.base_helix_angle),
-        )
-    )
-    return (
-        pair.working_center_distance,
-        jax.numpy.rad2deg(pair.working_pressure_angle),
-        pair.gear_ratio,
-        pair.axial_offset,
-        pair.face_width,
-        contact.base_pitch,
-        contact.contact_ratio,
-        contact.end - contact.start,
-        contact.start,
-        contact.inner_single,
-        contact.outer_single,
-        contact.end,
-        backlash,
-        *pair.backlash_limits,
-        *helical,
-    )

@@ -1,6 +1,6 @@
 """Result of a layout study: tables, text, figures and files."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -11,19 +11,11 @@ from ..contact import Mesh, MeshCycle
 from ..contact.kinematics import kinematics
 from ..contact.status import Status
 from ..io import DesignFile, write_flanks
-from ..layout import (
-    CASES,
-    FlankLine,
-    FlankLineLayout,
-    FlankLineTolerance,
-    ProfileLayout,
-    ToleranceCases,
-    gear_lives,
-)
+from ..layout import CASES, FlankLine, FlankLineLayout, FlankLineTolerance, ProfileLayout, ToleranceCases, gear_lives
 from ..metrics import Finding
 from ..microgeometry import AbstractModification
-from ..numerics import Given, real
-from ..report import Table
+from ..numerics import Given, UnitKey, real
+from ..report import Figure, Record, Table, table_of
 from ..shafts import ShaftSupport, bearing_reactions, root_face_load_factor, tooth_height
 from ..sweeps.columns import described
 from .evaluation import grid_lines
@@ -32,8 +24,13 @@ from .study import AbstractStudyResult
 from .summary_data import finding_data, flanks_data
 
 STEPS = ("unmodified", "step 1", "step 2")
-LIVES = ("pinion_life_h", "wheel_life_h")
+LIVES = UnitKey("pinion_life", "h"), UnitKey("wheel_life", "h")
 FACTORS = ("face_load_factor", "root_face_load_factor", "edge_load_factor")
+_AFTER = "without modification", "after step 1", "after step 2"
+_PATTERNS = {
+    "unmodified": "Contact pattern without modification: largest pressure of every place of the flank.",
+    "layout": "Contact pattern after all three steps: largest pressure of every place of the flank.",
+}
 _PANEL, _HEIGHT = 92.0, 90.0  # [mm]
 
 
@@ -187,22 +184,26 @@ class LayoutResult(AbstractStudyResult):
         """Lines of the findings: values out of the usual range."""
         return finding_lines(self.unusual)
 
+    def inputs(self) -> dict[str, Any]:
+        """Torque and tolerances."""
+        tolerances = {
+            name: {UnitKey("f_Hbeta", "um"): one.helix_slope, UnitKey("f_ma", "um"): one.misalignment}
+            for name, one in self.tolerances.items()
+        }
+        return {UnitKey("torque", "N m"): self.design.torque, "tolerances": tolerances}
+
     def summary(self) -> dict[str, Any]:
-        """Tolerances, layouts, contact, bearings and profiles."""
+        """Layouts, contact, bearings and profiles."""
+        torque = UnitKey("torque", "N m")
         return {
-            "torque_Nm": self.design.torque,
-            "tolerances": {
-                name: {"f_Hbeta_um": one.helix_slope, "f_ma_um": one.misalignment}
-                for name, one in self.tolerances.items()
-            },
             "layouts": {
                 name: {**_layout(layout), "findings": [finding_data(finding) for finding in self.unusual[name]]}
                 for name, layout in self.layouts.items()
             },
-            "face_load_over_torque": {"torque_Nm": self.torques, **_by_step(self.over_torque)},
+            "face_load_over_torque": {torque: self.torques, **_by_step(self.over_torque)},
             "contact": {
                 name: {
-                    "torque_Nm": self.profile_torque,
+                    torque: self.profile_torque,
                     **_by_step(steps),
                     "annex_e_face_load_factor": _by_step(self.factors[name]),
                     "cases": CASES,
@@ -220,17 +221,18 @@ class LayoutResult(AbstractStudyResult):
         }
 
     def _profile(self, profile: ProfileLayout) -> dict[str, Any]:
-        values = {name: profile.table.column(name) for name in profile.table.results} | self.lives(profile)
+        found = profile.table.values(*profile.table.results)
+        values = {column.quantity.key: each for column, each in found.items()} | self.lives(profile)
         return {
             "type": profile.kind,
-            "torque_Nm": self.profile_torque,
+            UnitKey("torque", "N m"): self.profile_torque,
             "variants": len(profile.table),
-            "amounts_um": profile.amounts,
-            "length_mm": profile.length,
-            "further_slope_and_crowning_um": profile.further,
+            UnitKey("amounts", "um"): profile.amounts,
+            UnitKey("length", "mm"): profile.length,
+            UnitKey("further_slope_and_crowning", "um"): profile.further,
             "contact_ratio": profile.contact_ratio,
-            "unmodified": {name: column[0] for name, column in values.items()},
-            "best": {name: column[profile.best] for name, column in values.items()},
+            "unmodified": {key: column[0] for key, column in values.items()},
+            "best": {key: column[profile.best] for key, column in values.items()},
         }
 
     def tables(self) -> Iterator[Table]:
@@ -242,44 +244,29 @@ class LayoutResult(AbstractStudyResult):
         yield self._bearings()
 
     def _steps(self) -> Table:
-        result = Table(("", *self.layouts), title=f"{self.design.title}: flank lines")
-
-        def row(text: str, values: Iterator[str]) -> None:
-            result.add_row(text, *values)
-
-        each = list(self.layouts.values())
-        row("torque of the layout [N m]", (f"{float(one.torque):g}" for one in each))
-        row("K_Hbeta without modification", (f"{float(one.factors[0]):.3f}" for one in each))
-        row("K_Fbeta without modification", (f"{float(root_factor(one, one.factors[0])):.3f}" for one in each))
-        result.add_section()
-        row(f"step 1, {self.main.gear}: slope [um]", (f"{float(one.line.slope):.2f}" for one in each))
-        row("  crowning [um]", (f"{float(one.line.crowning):.2f}" for one in each))
-        row("  K_Hbeta", (f"{float(one.factors[1]):.3f}" for one in each))
-        row("  K_Fbeta", (f"{float(root_factor(one, one.factors[1])):.3f}" for one in each))
-        result.add_section()
-        for index, gear in enumerate(("pinion", "wheel")):
-            row(f"step 2, {gear}: crowning C_b [um]", (f"{float(one.further[index]):.2f}" for one in each))
-        row("  least of both together [um]", (f"{float(one.needed):.2f}" for one in each))
-        for name in self.tolerances:
-            result.add_section()
-            tolerance = self.tolerances[name]
-            row(
-                f"{name}: f_Hb {float(tolerance.helix_slope):.1f}, f_ma {float(tolerance.misalignment):.1f} um",
-                ("unmodified / step 1 / step 2" for _ in each),
-            )
-            for number, case in enumerate(CASES):
-                row(
-                    f"  K_Hbeta, {case}",
-                    (" / ".join(_cell(of[name], number) for of in one.cases) for one in each),
-                )
-            row("  K_Fbeta, worst case", (_worst_root(one, name) for one in each))
-            if self.main.damage:
-                row("  life, worst case [h]", (_worst_life(one, name) for one in each))
-        if self.main.damage:
-            result.add_section()
-            for number, text in enumerate(("without modification", "after step 1", "after step 2")):
-                row(f"life {text} [h]", (f"{float(one.damage[number].life):.4g}" for one in each))
-        result.note = "* largest load at an edge" + ("; last rows: no deviation" if self.main.damage else "")
+        wears = bool(self.main.damage)
+        groups = [
+            [
+                Record("torque", "", lambda of: of.torque, "torque of the layout [N m]", "g"),
+                *_factors("{} without modification", 0),
+            ],
+            [
+                _record(f"step 1, {self.main.gear}: slope [um]", lambda of: of.line.slope, ".2f"),
+                _record("  crowning [um]", lambda of: of.line.crowning, ".2f"),
+                *_factors("  {}", 1),
+            ],
+            [
+                _record("step 2, pinion: crowning C_b [um]", lambda of: of.further[0], ".2f"),
+                _record("step 2, wheel: crowning C_b [um]", lambda of: of.further[1], ".2f"),
+                _record("  least of both together [um]", lambda of: of.needed, ".2f"),
+            ],
+            *([*_cases(name, tolerance, lives=wears)] for name, tolerance in self.tolerances.items()),
+            *([[_life(number, text) for number, text in enumerate(_AFTER)]] * wears),
+        ]
+        note = "* largest load at an edge" + "; last rows: no deviation" * wears
+        records = [record for group in groups for record in group]
+        result = table_of(records, self.layouts, f"{self.design.title}: flank lines", across=True, note=note)
+        result.ends = tuple(int(end) - 1 for end in np.cumsum([len(group) for group in groups])[:-1])
         return result
 
     def _contacts(self) -> Table:
@@ -288,9 +275,9 @@ class LayoutResult(AbstractStudyResult):
         result = Table(("", "K_Hbeta", "K_Fbeta", "edge load factor", "K_Hbeta of Annex E"), title=title)
         for support, steps in self.contacts.items():
             for step, found in steps.items():
-                cells = [_number(found[name]) for name in FACTORS]
                 given = self.factors[support].get(step)
-                result.add_row(f"{support}: {step}", *cells, "" if given is None else _number(given))
+                cells = *(f"{found[name]:.3f}" for name in FACTORS), "" if given is None else f"{given:.3f}"
+                result.add_row(f"{support}: {step}", *cells)
         return result
 
     def _contact_cases(self) -> Table:
@@ -300,7 +287,7 @@ class LayoutResult(AbstractStudyResult):
         for support, tolerances in self.contact_cases.items():
             for tolerance, steps in tolerances.items():
                 for step, factors in steps.items():
-                    result.add_row(f"{support}, {tolerance}: {step}", *map(_number, factors))
+                    result.add_row(f"{support}, {tolerance}: {step}", *(f"{factor:.3f}" for factor in factors))
         return result
 
     def _bearings(self) -> Table:
@@ -323,40 +310,35 @@ class LayoutResult(AbstractStudyResult):
         if self.profile is not None:
             self.profile.table.to_csv(folder / "profiles.csv")
 
-    def figures(self) -> dict[str, Any]:
+    def figures(self) -> Iterator[Figure]:
         """The cases, K_Hbeta over the torque, shafts, profiles and the contact."""
         from .. import plot
 
-        layout = self.main
-        name = list(layout.after)[-1]
-        axes: dict[str, Any] = {}
-        with plot.figure.report_axes(None, columns=3, width=3 * _PANEL, height=_HEIGHT) as panels:
-            for panel, of, title in zip(np.ravel(panels), layout.cases, STEPS):
-                plot.tolerance_line_load(of[name], panel, title=f"{title}, {name} deviations")
-            for panel in panels[1:]:
-                panel.set_ylabel("")
-        axes["tolerance_cases"] = panels
-        shown = {f"{step}, {kind}": one for step, of in zip(STEPS, layout.cases) for kind, one in of.items()}
-        axes["face_load_factors"] = plot.face_load_factors(shown)
-        axes["face_load_over_torque"] = plot.face_load_over_torque(
-            self.torques, self.over_torque, design_torque=self.design.torque
-        )
-        axes["shaft_deflection"] = plot.shaft_deflection(next(iter(self.supports.values())).gearbox)
+        steps, name = dict(zip(STEPS, self.main.cases)), list(self.main.after)[-1]
+
+        def draw(panel: Any, step: str) -> None:
+            plot.tolerance_line_load(steps[step][name], panel, title=f"{step}, {name} deviations")
+
+        caption = "Load over the face under the combinations of deviations within the tolerances."
+        yield Figure("tolerance_cases", caption, plot.panels(draw, steps, width=_PANEL, height=_HEIGHT))
+        shown = {f"{step}, {kind}": one for step, of in steps.items() for kind, one in of.items()}
+        yield Figure.of(plot.face_load_factors, shown)
+        loads = {"design_torque": self.design.torque}
+        yield Figure.of(plot.face_load_over_torque, self.torques, self.over_torque, **loads)
+        yield Figure.of(plot.shaft_deflection, next(iter(self.supports.values())).gearbox)
         if self.cycles:
-            axes["transmission_error"] = plot.transmission_error(self.cycles)
-            axes["load_sharing"] = plot.load_sharing(self.cycles)
+            yield Figure.of(plot.transmission_error, self.cycles)
+            yield Figure.of(plot.load_sharing, self.cycles)
             for step, cycle in self.cycles.items():
-                axes[f"contact_pattern_{step}"] = plot.contact_pattern(cycle)
-            mesh = next(iter(self.meshes.values()))
-            axes["lead_chart"] = plot.lead_chart(mesh, self.designs())
+                yield Figure(f"contact_pattern_{step}", _PATTERNS[step], plot.contact_pattern(cycle))
+            yield Figure.of(plot.lead_chart, next(iter(self.meshes.values())), self.designs())
         if self.profile is not None:
             rows, names = self.profile.radar_variants()
             values = self.profile.radar_table()
             for gear, hours in zip(("pinion", "wheel"), self.lives(self.profile).values()):
                 if np.isfinite(hours[rows]).all():
                     values[described(f"{gear}_life", "h", better="larger")] = hours
-            axes["radar"] = plot.radar(values, rows, names)
-        return axes
+            yield Figure.of(plot.radar, values, rows, names)
 
 
 def flank_lines(layout: FlankLineLayout) -> dict[str, tuple[FlankLine, FlankLine]]:
@@ -374,13 +356,15 @@ def root_factor(layout: FlankLineLayout, factor: Given) -> np.ndarray:
 
 
 def _layout(layout: FlankLineLayout) -> dict[str, Any]:
-    def line(of: FlankLine) -> dict[str, Any]:
-        return {"slope_um": of.slope, "crowning_um": of.crowning}
+    hours = UnitKey("life", "h")
+
+    def line(of: FlankLine) -> dict[UnitKey, Any]:
+        return {UnitKey("slope", "um"): of.slope, UnitKey("crowning", "um"): of.crowning}
 
     def cases(of: Mapping[str, ToleranceCases], step: int) -> dict[str, Any]:
         return {
             name: {
-                **({"life_h": layout.lives[name][step]} if layout.lives else {}),
+                **({hours: layout.lives[name][step]} if layout.lives else {}),
                 "face_load_factor": one.face_load_factor,
                 "root_face_load_factor": root_factor(layout, one.face_load_factor),
                 "edge_contact": one.edge_contact,
@@ -389,32 +373,25 @@ def _layout(layout: FlankLineLayout) -> dict[str, Any]:
             for name, one in of.items()
         }
 
-    life = (
-        {
-            "life_h": [one.life for one in layout.damage],
-            "relative_life": layout.relative_life,
-            "worst_relative_life": {name: layout.worst_relative_life(name) for name in layout.lives},
-        }
-        if layout.damage
-        else {}
-    )
+    life = {
+        hours: [one.life for one in layout.damage],
+        "relative_life": layout.relative_life,
+        "worst_relative_life": {name: layout.worst_relative_life(name) for name in layout.lives},
+    }
     factors = np.asarray(layout.factors)
     return {
-        "torque_Nm": layout.torque,
+        UnitKey("torque", "N m"): layout.torque,
         "gear": layout.gear,
         "step_1": line(layout.line),
-        "further_crowning_um": layout.further,
-        "least_further_crowning_um": layout.needed,
+        UnitKey("further_crowning", "um"): layout.further,
+        UnitKey("least_further_crowning", "um"): layout.needed,
         "pinion": line(layout.pinion),
         "wheel": line(layout.wheel),
         "face_load_factor": dict(zip(("unmodified", "step_1"), factors)),
         "root_face_load_factor": dict(zip(("unmodified", "step_1"), root_factor(layout, factors))),
         "cases": CASES,
-        **{
-            f"{step.replace(' ', '_')}_cases": cases(of, number)
-            for number, (step, of) in enumerate(zip(STEPS, layout.cases))
-        },
-        **life,
+        **_by_step({f"{step} cases": cases(of, number) for number, (step, of) in enumerate(zip(STEPS, layout.cases))}),
+        **(life if layout.damage else {}),
     }
 
 
@@ -422,26 +399,47 @@ def _by_step(of: Mapping[str, Any]) -> dict[str, Any]:
     return {step.replace(" ", "_"): value for step, value in of.items()}
 
 
-def _reactions(support) -> dict[str, Any]:
+def _reactions(support: ShaftSupport) -> dict[str, Any]:
     found = bearing_reactions(support.gearbox)
-    return {
-        name: {"force_N": force[:3], "shaft_um": shaft[:3], "seat_um": seat[:3]}
-        for name, force, shaft, seat in zip(found.names, *map(np.asarray, (found.force, found.shaft, found.seat)))
-    }
+    keys = UnitKey("force", "N"), UnitKey("shaft", "um"), UnitKey("seat", "um")
+    columns = map(np.asarray, (found.force, found.shaft, found.seat))
+    return {name: dict(zip(keys, (each[:3] for each in row))) for name, *row in zip(found.names, *columns)}
+
+
+def _record(heading: str, of: Callable[[FlankLineLayout], Any], form: str = ".3f") -> Record[FlankLineLayout]:
+    return Record(heading, "", of, heading, form)
+
+
+def _factors(heading: str, step: int) -> Iterator[Record[FlankLineLayout]]:
+    """K_Hbeta and K_Fbeta after a step without deviations."""
+    yield _record(heading.format("K_Hbeta"), lambda of: of.factors[step])
+    yield _record(heading.format("K_Fbeta"), lambda of: root_factor(of, of.factors[step]))
+
+
+def _life(step: int, after: str) -> Record[FlankLineLayout]:
+    return _record(f"life {after} [h]", lambda of: of.damage[step].life, ".4g")
+
+
+def _cases(name: str, tolerance: FlankLineTolerance, *, lives: bool) -> Iterator[Record[FlankLineLayout]]:
+    """K_Hbeta after every step in the cases of deviations within a tolerance, with K_Fbeta and life of the worst."""
+
+    def record(heading: str, each: Callable[[FlankLineLayout], Iterable[str]]) -> Record[FlankLineLayout]:
+        return Record(heading, "", lambda of: " / ".join(each(of)), heading, "s")
+
+    def factor(number: int) -> Callable[[FlankLineLayout], Iterable[str]]:
+        return lambda of: (_cell(step[name], number) for step in of.cases)
+
+    limits = f"f_Hb {float(tolerance.helix_slope):.1f}, f_ma {float(tolerance.misalignment):.1f} um"
+    yield record(f"{name}: {limits}", lambda of: STEPS)
+    for number, case in enumerate(CASES):
+        yield record(f"  K_Hbeta, {case}", factor(number))
+    yield record(
+        "  K_Fbeta, worst case",
+        lambda of: (f"{float(root_factor(of, np.max(step[name].face_load_factor))):.3f} " for step in of.cases),
+    )
+    if lives:
+        yield record("  life, worst case [h]", lambda of: (f"{float(np.min(each)):.4g} " for each in of.lives[name]))
 
 
 def _cell(cases: ToleranceCases, number: int) -> str:
     return f"{float(cases.face_load_factor[number]):.3f}{'*' if bool(cases.edge_contact[number]) else ' '}"
-
-
-def _worst_root(layout: FlankLineLayout, name: str) -> str:
-    worst = (np.max(of[name].face_load_factor) for of in layout.cases)
-    return " / ".join(f"{float(root_factor(layout, factor)):.3f} " for factor in worst)
-
-
-def _worst_life(layout: FlankLineLayout, name: str) -> str:
-    return " / ".join(f"{float(np.min(lives)):.4g} " for lives in layout.lives[name])
-
-
-def _number(value: float) -> str:
-    return f"{value:.3f}"

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,7 @@ import numpy as np
 from ..contact import Mesh
 from ..io import DesignFile
 from ..io.tolerance_table import manufactured_of
-from ..report import Chapter, Table
+from ..report import Chapter, Figure, Record, numbers_of, table_of
 from ..sweeps import Scatter, monte_carlo
 from ..tolerance import ManufacturedGears
 from .evaluation import Evaluation
@@ -47,54 +48,40 @@ def failures(evaluations: Evaluations) -> Iterator[str]:
             yield f"CONTACT SOLUTION NOT CONVERGED: {name}, {count} manufactured pairs; they count as the worst"
 
 
-def pages(design: DesignFile, evaluations: Evaluations) -> list[Chapter]:
+_RECORDS: tuple[Record[Scatter], ...] = (
+    Record("nominal_ppte", "um", attrgetter("nominal_ppte"), "without deviations [um]"),
+    Record("mean_ppte", "um", attrgetter("mean"), "mean [um]"),
+    Record("std_ppte", "um", attrgetter("std"), "standard deviation [um]"),
+    Record("q95_ppte", "um", attrgetter("ppte_quantile95"), "95 % quantile [um]"),
+    Record("failed", "", attrgetter("failed"), "failed pairs", "d"),
+    Record("pairs", "", lambda of: of.ppte.shape[0]),
+)
+
+
+def pages(design: DesignFile, evaluations: Evaluations) -> Iterator[Chapter]:
     """The part of the report about robustness; nothing without a table [tolerance]."""
     scatters = _scatters(evaluations)
-    if not scatters:
-        return []
-    table = Table(("", *scatters), title=f"PPTE over manufactured pairs, {design.torque:g} N m on the pinion")
-    for label, of in (
-        ("without deviations [um]", lambda scatter: scatter.nominal_ppte),
-        ("mean [um]", lambda scatter: scatter.mean),
-        ("standard deviation [um]", lambda scatter: scatter.std),
-        ("95 % quantile [um]", lambda scatter: scatter.ppte_quantile95),
-    ):
-        table.add_row(label, *(f"{float(of(scatter)):.3f}" for scatter in scatters.values()))
-    table.add_row("failed pairs", *(str(scatter.failed) for scatter in scatters.values()))
-    scatter = next(iter(scatters.values()))
-    text = (
-        f"{_pairs(design, scatter)}, drawn at random within the limits of ISO 1328-1:2013, the same for every design."
-    )
-    even = " Deviations along the face are left out, as one slice cannot show them."
-    return [Chapter("Robustness", [text + (even if design.resolution().slices == 1 else "")], tables=[table])]
+    if scatters:
+        title = f"PPTE over manufactured pairs, {design.torque:g} N m on the pinion"
+        pairs = _pairs(design, next(iter(scatters.values())))
+        text = f"{pairs}, drawn at random within the limits of ISO 1328-1:2013, the same for every design."
+        even = " Deviations along the face are left out, as one slice cannot show them."
+        text += even * (design.resolution().slices == 1)
+        yield Chapter("Robustness", [text], tables=[table_of(_RECORDS, scatters, title, across=True)])
 
 
 def summary(evaluation: Evaluation) -> dict[str, Any]:
     """The scatter of a design as plain data."""
-    scatter = evaluation.scatter
-    if scatter is None:
-        return {}
-    return {
-        "manufactured": {
-            "pairs": scatter.ppte.shape[0],
-            "failed": scatter.failed,
-            "nominal_ppte_um": float(scatter.nominal_ppte),
-            "mean_ppte_um": float(scatter.mean),
-            "std_ppte_um": float(scatter.std),
-            "q95_ppte_um": float(scatter.ppte_quantile95),
-        }
-    }
+    return {} if evaluation.scatter is None else {"manufactured": numbers_of(_RECORDS, evaluation.scatter)}
 
 
-def figures(evaluations: Evaluations) -> dict[str, Any]:
-    """Axes with the scatter of all designs; empty without a table [tolerance]."""
-    scatters = _scatters(evaluations)
-    if not scatters:
-        return {}
+def figures(evaluations: Evaluations) -> Iterator[Figure]:
+    """Figure of the scatter of all designs; nothing without a table [tolerance]."""
     from .. import plot
 
-    samples = {name: np.asarray(scatter.ppte) for name, scatter in scatters.items()}
-    return {"ppte_distribution": plot.ppte_distribution(samples)}
+    samples = {name: np.asarray(scatter.ppte) for name, scatter in _scatters(evaluations).items()}
+    if samples:
+        yield Figure.of(plot.ppte_distribution, samples)
 
 
 def _scatters(evaluations: Evaluations) -> Mapping[str, Scatter]:

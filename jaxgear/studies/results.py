@@ -1,12 +1,12 @@
 """Files of the result of a study in a folder."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from ..io import write_summary
+from ..io.folder import CONTENTS
+from ..report import Figure
 from .gear_data import gears
 from .study import AbstractStudy, AbstractStudyResult
 from .summary_data import identity, versions
@@ -17,6 +17,7 @@ def study_summary(study: AbstractStudy[Any], result: AbstractStudyResult) -> dic
     design, left_out = study.design, "; ".join(line for line in (study.left_out, study.omits()) if line)
     return {
         **identity(design),
+        **result.inputs(),
         **result.summary(),
         **gears(design),
         "versions": versions(),
@@ -25,10 +26,19 @@ def study_summary(study: AbstractStudy[Any], result: AbstractStudyResult) -> dic
     }
 
 
+def write_study_summary(folder: Path, study: AbstractStudy[Any], result: AbstractStudyResult) -> dict[str, Any]:
+    """Writes `summary.json` as the last file of a result, whose files it lists, and returns its contents."""
+    name = "summary.json"
+    contents = sorted({name, *(path.name for path in folder.iterdir())})
+    data = {**study_summary(study, result), CONTENTS: contents}
+    write_summary(folder / name, data)
+    return data
+
+
 def write_results(
     folder: str | Path, study: AbstractStudy[Any], result: AbstractStudyResult, *, figures: bool = True
 ) -> tuple[dict[str, Any], list[Path]]:
-    """Writes `summary.json`, the further files of a result and its figures.
+    """Writes the files of a result, its figures and `summary.json`.
 
     Args:
         folder: for the files; made where it is missing.
@@ -42,19 +52,20 @@ def write_results(
     Raises:
         OSError: when a file cannot be written.
     """
-    data, folder = study_summary(study, result), Path(folder)
+    folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
-    write_summary(folder / "summary.json", data)
     result.write(folder)
-    return data, save_figures(folder, result.figures()) if figures else []
+    files = list(save_figures(folder, result.figures())) if figures else []
+    return write_study_summary(folder, study, result), files
 
 
-def save_figures(folder: Path, axes: Mapping[str, Any], *, bold: str | None = None) -> list[Path]:
-    """Writes the figures that hold the axes, each under its name, the lines of one design bold; gives the files."""
+def save_figures(folder: Path, figures: Iterable[Figure], *, bold: str | None = None) -> dict[Path, str]:
+    """Writes figures, each under its name, the lines of one design bold; returns the captions by file."""
     from .. import plot
 
-    figures = {name: np.ravel(drawn)[0].figure for name, drawn in axes.items()}
-    if bold is not None:
-        for figure in figures.values():
-            plot.emphasize(figure, bold)
-    return [plot.save(figure, folder / f"{name}.png") for name, figure in figures.items()]
+    saved = {}
+    for figure in figures:
+        if bold is not None:
+            plot.emphasize(figure.figure, bold)
+        saved[plot.save(figure.figure, folder / f"{figure.name}.png")] = figure.caption
+    return saved

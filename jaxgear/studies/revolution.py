@@ -1,8 +1,8 @@
 """The study of a revolution: from a design file to the transmission error and the orders of teeth that differ."""
 
-import csv
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, ClassVar, Self
 
@@ -10,9 +10,10 @@ import numpy as np
 
 from ..contact.status import reason
 from ..io import DesignFile, Search, teeth_of
+from ..io.results import write_csv
 from ..microgeometry import AbstractModification
-from ..numerics import changed
-from ..report import Table
+from ..numerics import UnitKey, changed
+from ..report import Figure, Record, Table, numbers_of, table_of
 from ..revolution import Revolution, Teeth, named_orders, solve_revolution, tooth_shares
 from ..revolution.quantities import OF_REVOLUTION, number_of
 from ..revolution.solve import GEARS
@@ -64,6 +65,29 @@ class RevolutionStudy(AbstractStudy["RevolutionResult"]):
         return RevolutionResult(design, self.teeth, designs, found)
 
 
+def _number(name: str, revolution: Revolution) -> float | None:
+    try:
+        return float(number_of(name, revolution))
+    except ValueError:  # orders of a gear that makes no whole revolution
+        return None
+
+
+_HEADINGS = {
+    "total_composite_error": "total\ncomposite\n[um]",
+    "tooth_to_tooth_error": "tooth to\ntooth\n[um]",
+    "mesh_order": "mesh\norder\n[um]",
+    "pinion_shaft_order": "pinion\nonce per\nturn [um]",
+    "wheel_shaft_order": "wheel\nonce per\nturn [um]",
+    "pinion_side_bands": "pinion\nside bands\n[um]",
+    "wheel_side_bands": "wheel\nside bands\n[um]",
+    "max_revolution_pressure": "pressure\n[MPa]",
+}
+_RECORDS: list[Record[Revolution]] = [
+    Record(of.name, of.unit, partial(_number, of.name), _HEADINGS.get(of.name), ".0f" if of.unit == "MPa" else ".3f")
+    for of in map(quantity_of, (*_HEADINGS, *(name for name in OF_REVOLUTION if name not in _HEADINGS)))
+]
+
+
 @dataclass(frozen=True)
 class RevolutionResult(AbstractStudyResult):
     """Revolutions of all designs.
@@ -85,37 +109,11 @@ class RevolutionResult(AbstractStudyResult):
     designs: Mapping[str, tuple[AbstractModification, AbstractModification]]
     revolutions: Mapping[str, Revolution]
 
-    def _numbers(self, revolution: Revolution) -> dict[str, float]:
-        """Quantities of a revolution by their keys, as far as its windows have them."""
-        found = {}
-        for name in OF_REVOLUTION:
-            try:
-                found[quantity_of(name).key] = float(number_of(name, revolution))
-            except ValueError:  # orders of a gear that makes no whole revolution
-                continue
-        return found
-
-    def tables(self) -> list[Table]:
+    def tables(self) -> Iterator[Table]:
         """One row per design."""
-        columns = {
-            "total_composite_error_um": "total\ncomposite\n[um]",
-            "tooth_to_tooth_error_um": "tooth to\ntooth\n[um]",
-            "mesh_order_um": "mesh\norder\n[um]",
-            "pinion_shaft_order_um": "pinion\nonce per\nturn [um]",
-            "wheel_shaft_order_um": "wheel\nonce per\nturn [um]",
-            "pinion_side_bands_um": "pinion\nside bands\n[um]",
-            "wheel_side_bands_um": "wheel\nside bands\n[um]",
-            "max_revolution_pressure_MPa": "pressure\n[MPa]",
-        }
-        numbers = {name: self._numbers(found) for name, found in self.revolutions.items()}
-        columns = {key: text for key, text in columns.items() if all(key in each for each in numbers.values())}
         windows = next(iter(self.revolutions.values())).windows
         title = f"{self.design.title}: transmission error over {windows} base pitches, {self.design.torque:g} N m"
-        result = Table(("design", *columns.values()), title=title)
-        for name, each in numbers.items():
-            cells = (f"{each[key]:.0f}" if key.endswith("MPa") else f"{each[key]:.3f}" for key in columns)
-            result.add_row(name, *cells)
-        return [result]
+        yield table_of(_RECORDS, self.revolutions, title, "design")
 
     def verdict(self) -> Iterator[str]:
         """The most loaded teeth of every design."""
@@ -139,43 +137,43 @@ class RevolutionResult(AbstractStudyResult):
                     "Raise resolution.newton_steps or resolution.pairs."
                 )
 
+    def inputs(self) -> dict[str, Any]:
+        """The torque."""
+        return {UnitKey("torque", "N m"): self.design.torque}
+
     def summary(self) -> dict[str, Any]:
-        """Numbers and named orders of all designs."""
+        """Numbers and shares of the teeth of all designs."""
         designs = {
             name: {
-                **self._numbers(revolution),
+                **numbers_of(_RECORDS, revolution),
                 **{f"{gear}_tooth_shares": np.asarray(tooth_shares(revolution, gear)) for gear in GEARS},
                 **flanks_data(*self.designs[name]),
             }
             for name, revolution in self.revolutions.items()
         }
-        first = next(iter(self.revolutions.values()))
-        return {"torque_Nm": self.design.torque, "base_pitches": first.windows, "designs": designs}
+        return {"base_pitches": next(iter(self.revolutions.values())).windows, "designs": designs}
 
     def write(self, folder: Path) -> None:
         """Transmission error at every place, `revolution.csv`, and the named orders, `orders.csv`, of all designs."""
-        with (folder / "revolution.csv").open("w", newline="", encoding="utf-8") as file:
-            writer = csv.writer(file)
-            writer.writerow(["phase", *(f"{name}_um" for name in self.revolutions)])
-            first = next(iter(self.revolutions.values()))
-            curves = [np.asarray(found.transmission_error) for found in self.revolutions.values()]
-            writer.writerows([f"{value:.7g}" for value in row] for row in zip(np.asarray(first.phase), *curves))
-        with (folder / "orders.csv").open("w", newline="", encoding="utf-8") as file:
-            writer = csv.writer(file)
-            writer.writerow(["design", "name", "order", "pinion_order", "amplitude_um"])
-            for name, found in self.revolutions.items():
-                for line in named_orders(found, self.teeth):
-                    order = f"{line.pinion_order:.7g}"
-                    writer.writerow([name, line.name, line.order, order, f"{line.amplitude:.7g}"])
+        first = next(iter(self.revolutions.values()))
+        curves = (np.asarray(found.transmission_error) for found in self.revolutions.values())
+        header = "phase", *(f"{name}_um" for name in self.revolutions)
+        write_csv(folder / "revolution.csv", header, zip(np.asarray(first.phase), *curves))
+        orders = (
+            (name, line.name, line.order, float(line.pinion_order), float(line.amplitude))
+            for name, found in self.revolutions.items()
+            for line in named_orders(found, self.teeth)
+        )
+        write_csv(folder / "orders.csv", ("design", "name", "order", "pinion_order", "amplitude_um"), orders)
 
-    def figures(self) -> dict[str, Any]:
+    def figures(self) -> Iterator[Figure]:
         """Transmission error over a revolution, and the orders of every design."""
         from .. import plot
 
-        count, last = len(self.revolutions), list(self.revolutions.values())[-1]
-        size: dict[str, Any] = {"rows": count, "width": 1.4 * plot.figure.WIDTH, "height": _PANEL * count}
-        with plot.figure.report_axes(None, **size) as panels:
-            for panel, (name, found) in zip(np.ravel(panels), self.revolutions.items()):
-                plot.order_spectrum(found, self.teeth, panel, title=name)
-                panel.set_xlabel(panel.get_xlabel() if found is last else "")
-        return {"revolution": plot.revolution(self.revolutions), "orders": panels}
+        def draw(panel: Any, name: str) -> None:
+            plot.order_spectrum(self.revolutions[name], self.teeth, panel, title=name)
+
+        yield Figure.of(plot.revolution, self.revolutions)
+        size = {"width": 1.4 * plot.figure.WIDTH, "height": _PANEL}
+        caption = "Amplitudes of the transmission error over the order of the pinion, with what they come from."
+        yield Figure("orders", caption, plot.panels(draw, self.revolutions, **size, stacked=True))

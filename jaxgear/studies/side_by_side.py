@@ -8,7 +8,6 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ..contact import Mesh
-from ..geometry import Gear
 from ..io import DesignFile, describe
 from ..io.results import unit_of
 from ..io.tolerance_table import quality_classes
@@ -16,7 +15,7 @@ from ..metrics import Finding, Quantity, findings_of
 from ..microgeometry import AbstractModification
 from ..numerics import program
 from ..optimize import Verified
-from ..report import Table
+from ..report import Figure, Table
 from ..vocabulary import quantities
 from .evaluation import Evaluation, grid_lines, grid_of
 
@@ -113,12 +112,6 @@ def grid(evaluations: Evaluations, more: str = "") -> Iterator[str]:
     return grid_lines(grid_of(moving.resolution, helical=moving.helical), changes, more)
 
 
-@program
-def diameters(gear: Gear) -> tuple[Float[Array, ""], Float[Array, ""], Float[Array, ""]]:
-    """Diameters of tip, tip form circle and bore [mm]."""
-    return 2 * gear.tip_radius, 2 * gear.tip_form_radius, 2 * gear.bore_radius
-
-
 def quantities_of(evaluations: Evaluations) -> list[Quantity]:
     """The quantities that are known of every design, in the order of the vocabulary."""
     known = [evaluation.metrics for evaluation in evaluations.values()]
@@ -136,12 +129,6 @@ def verified(evaluations: Evaluations) -> list[Verified]:
     return [evaluation.verified for evaluation in evaluations.values() if evaluation.verified is not None]
 
 
-def reduction(evaluations: Evaluations) -> float:
-    """Reduction of the PPTE of the first design, which is unmodified, by the main design [%]."""
-    before = next(iter(evaluations.values())).metrics["ppte_um"]
-    return 100 * (1 - main(evaluations).metrics["ppte_um"] / before) if before else 0.0
-
-
 def main(evaluations: Evaluations) -> Evaluation:
     """The design that the run is about: the optimum where there is one, else the last."""
     return evaluations[main_name(evaluations)]
@@ -152,54 +139,53 @@ def main_name(evaluations: Evaluations) -> str:
     return "optimum" if "optimum" in evaluations else list(evaluations)[-1]
 
 
-def figures(file: DesignFile, mesh: Mesh, evaluations: Evaluations, torques: np.ndarray) -> dict[str, Any]:
-    """Axes of the designs by name, the lines of the main one bold; the Harris map shows the main one."""
+def figures(file: DesignFile, mesh: Mesh, evaluations: Evaluations, torques: np.ndarray) -> Iterator[Figure]:
+    """Figures of the designs, the lines of the main one bold; the Harris map shows the main one."""
+    from .. import plot
+
+    for figure in _figures(file, mesh, evaluations, torques):
+        plot.emphasize(figure.figure, main_name(evaluations))
+        yield figure
+
+
+def _figures(file: DesignFile, mesh: Mesh, evaluations: Evaluations, torques: np.ndarray) -> Iterator[Figure]:
     from .. import plot
 
     cycles = {name: evaluation.cycle for name, evaluation in evaluations.items()}
     few = np.unique(np.linspace(0, len(torques) - 1, _HARRIS_CURVES).round().astype(int))
-    axes: dict[str, Any] = {
-        "transmission_error": plot.transmission_error(cycles),
-        "transmission_error_orders": plot.transmission_error_orders(cycles, count=_orders(mesh)),
-        "load_sharing": plot.load_sharing(cycles),
-        "pressure": plot.pressure(cycles),
-        "ppte_over_torque": plot.ppte_over_torque(
-            torques, {name: evaluation.ppte for name, evaluation in evaluations.items()}, design_torque=file.torque
-        ),
-        "harris_map": plot.harris_map(
-            mesh.phase, torques[few], main(evaluations).transmission_error[few], design=main_name(evaluations)
-        ),
-        "k_chart": plot.k_chart(mesh, flanks(evaluations), **_band(file, evaluations)),
-    }
+    ppte = {name: evaluation.ppte for name, evaluation in evaluations.items()}
+    best = main(evaluations)
+    yield Figure.of(plot.transmission_error, cycles)
+    yield Figure.of(plot.transmission_error_orders, cycles, count=_orders(mesh))
+    yield Figure.of(plot.load_sharing, cycles)
+    yield Figure.of(plot.pressure, cycles)
     if mesh.resolution.slices > 1:
-        axes |= _over_face(file, mesh, evaluations, torques)
-    for drawn in axes.values():
-        plot.emphasize(np.ravel(drawn)[0].figure, main_name(evaluations))
-    return axes
+        yield from _maps(mesh, best, main_name(evaluations))
+    yield Figure.of(plot.k_chart, mesh, flanks(evaluations), **_band(file, evaluations))
+    if mesh.resolution.slices > 1:
+        yield Figure.of(plot.lead_chart, mesh, flanks(evaluations), **_band(file, evaluations))
+    yield Figure.of(plot.ppte_over_torque, torques, ppte, design_torque=file.torque)
+    of_main = best.transmission_error[few]
+    yield Figure.of(plot.harris_map, mesh.phase, torques[few], of_main, design=main_name(evaluations))
+    if mesh.resolution.slices > 1:
+        factors = {name: evaluation.face_load for name, evaluation in evaluations.items()}
+        yield Figure.of(plot.face_load_over_torque, torques, factors, design_torque=file.torque)
 
 
-def _over_face(file: DesignFile, mesh: Mesh, evaluations: Evaluations, torques: np.ndarray) -> dict[str, Any]:
-    """Figures of what several slices show; those of one design are of the main one."""
+def _maps(mesh: Mesh, design: Evaluation, name: str) -> Iterator[Figure]:
+    """Figures of one design over the face, with its name."""
     from .. import plot
 
-    cycle, name = main(evaluations).cycle, main_name(evaluations)
-    maps = {"pressure_map": plot.pressure_map(cycle), "contact_pattern": plot.contact_pattern(cycle)}
-    if cycle.kinematics.helical:
-        maps["plane_of_action"] = plot.plane_of_action(cycle)
-    for drawn in maps.values():
-        first = np.ravel(drawn)[0]
+    cycle = design.cycle
+    for draw in (plot.pressure_map, *([plot.plane_of_action] * cycle.kinematics.helical), plot.contact_pattern):
+        figure = Figure.of(draw, cycle)
+        first = np.ravel(figure.axes)[0]
         over = {"pad": plot.figure.ABOVE_MARKS} if first.texts else {}
         first.set_title(name, loc="left", fontsize=_TITLE, **over)
-    lines = {"line_load": plot.line_load(cycle), "face_gap": plot.face_gap(cycle, mesh)}
-    for drawn in lines.values():
-        drawn.get_legend().set(title=name, alignment="left")
-    factors = {name: evaluation.face_load for name, evaluation in evaluations.items()}
-    return {
-        **maps,
-        **lines,
-        "lead_chart": plot.lead_chart(mesh, flanks(evaluations), **_band(file, evaluations)),
-        "face_load_over_torque": plot.face_load_over_torque(torques, factors, design_torque=file.torque),
-    }
+        yield figure
+    for figure in (Figure.of(plot.line_load, cycle), Figure.of(plot.face_gap, cycle, mesh)):
+        figure.axes.get_legend().set(title=name, alignment="left")
+        yield figure
 
 
 def _orders(mesh: Mesh) -> int:

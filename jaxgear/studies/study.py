@@ -1,13 +1,13 @@
 """Base classes of studies, checked when made, and of their results: summary, tables, text and figures."""
 
 import abc
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar, Generic, Self, TypeVar
 
 from ..io import DesignFile
-from ..report import Chapter, Table
+from ..report import Chapter, Figure, Table
 from . import manufactured
 from .checkpoints import Checkpoints
 from .progress import Callback, Stages
@@ -26,9 +26,13 @@ class AbstractStudyResult(abc.ABC):
 
     assumptions: ClassVar[tuple[str, ...]] = ()
 
+    def inputs(self) -> dict[str, Any]:
+        """Input values as plain data: loads, settings, model; the first part of `summary.json`."""
+        return {}
+
     @abc.abstractmethod
     def summary(self) -> dict[str, Any]:
-        """The result as plain data, names with their units; `study_summary` adds design file, gears and versions."""
+        """The results as plain data; a `UnitKey` is a name with a unit."""
 
     def headlines(self) -> Iterable[Table]:
         """Tables of two columns to be read before all others; they say what `findings` says."""
@@ -54,13 +58,17 @@ class AbstractStudyResult(abc.ABC):
         """A line for every result that did not converge or limit that is not met; a command fails with any."""
         return ()
 
-    def chapters(self) -> Sequence[Chapter]:
+    def checks(self) -> Iterable[tuple[str, str]]:
+        """Name and text of numbers that show convergence and validity, for a report."""
+        return ()
+
+    def chapters(self) -> Iterable[Chapter]:
         """Further chapters of a report."""
         return ()
 
-    def figures(self) -> Mapping[str, Any]:
-        """Axes by the name of the picture, drawn anew."""
-        return {}
+    def figures(self) -> Iterable[Figure]:
+        """The figures, drawn anew."""
+        return ()
 
     def reported(self, folder: Path, facts: Sequence[tuple[str, str]], *, figures: bool) -> "AbstractStudyResult":
         """The result with everything that a report shows besides; by default the result itself.
@@ -73,7 +81,7 @@ class AbstractStudyResult(abc.ABC):
         return self
 
     def write(self, folder: Path) -> None:  # noqa: B027 - the default writes nothing
-        """Writes further files, such as tables of every number, into a folder; `AbstractStudy.files` names them."""
+        """Writes further files, such as tables of every number, into a folder."""
 
 
 @dataclass(frozen=True)
@@ -89,7 +97,6 @@ class AbstractStudy(abc.ABC, Generic[R]):
         name: of the study and of its command.
         coarse: what a quick study has too few of; "" where its result says it.
         needs: modules that it imports late; a command imports them ahead, beside its first compilation.
-        files: names of files that its results may have beside those of the studies of jaxgear.
         report_needs: modules that its report needs besides.
         grows: elements of a result that grows in its folder, a field `output` of the study, while the study runs for
             long, such as "variants"; "" if all results are put in place at the end.
@@ -102,7 +109,6 @@ class AbstractStudy(abc.ABC, Generic[R]):
     name: ClassVar[str]
     coarse: ClassVar[str] = "coarse positions"
     needs: ClassVar[tuple[str, ...]] = ()
-    files: ClassVar[frozenset[str]] = frozenset()
     report_needs: ClassVar[tuple[str, ...]] = ()
     grows: ClassVar[str] = ""
     takes_shafts: ClassVar[bool] = False

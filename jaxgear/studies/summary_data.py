@@ -13,6 +13,7 @@ from ..io import DesignFile, describe
 from ..io.table_keys import snake
 from ..metrics import Finding
 from ..microgeometry import AbstractModification
+from ..numerics import Number, UnitKey, fields_of
 from ..version import version
 
 
@@ -66,3 +67,19 @@ def _options(part: eqx.Module) -> dict[str, Any]:
 def finding_data(finding: Finding) -> dict[str, Any]:
     """A finding by name, place, value and what is usual."""
     return {"name": finding.key, "where": finding.where, "value": finding.value, **finding.usual._asdict()}
+
+
+def key_of(name: str, number: Number | None) -> UnitKey:
+    """Key of a field, with the unit of a number."""
+    return UnitKey(name, "" if number is None or number.unit == "x module" else number.unit)
+
+
+def fields_data(part: eqx.Module, *, units: bool = False) -> dict[str, Any]:
+    """Fields of a part, and of parts within it, that are not None; by name, or by name and unit."""
+    given = {field.name: getattr(part, field.name) for field in dataclasses.fields(part)}
+    numbers = fields_of(type(part)) if units else {}
+    return {
+        key_of(name, numbers.get(name)): fields_data(value) if isinstance(value, eqx.Module) else value
+        for name, value in given.items()
+        if value is not None
+    }

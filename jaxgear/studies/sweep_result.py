@@ -13,7 +13,8 @@ import numpy as np
 from ..contact import Mesh, Resolution
 from ..io import DesignFile, writing
 from ..microgeometry import NoModification
-from ..report import Chapter, Table, figure, text, write_variants, write_workbook
+from ..numerics import UnitKey
+from ..report import Chapter, Figure, Table, picture, text, write_variants, write_workbook
 from ..sweeps import SweepTable
 from . import side_by_side
 from .comparison import Modifications
@@ -87,29 +88,31 @@ class SweepResult(AbstractStudyResult):
             yield f"best {len(self.best)} in {folder / BEST}, table in {folder / TABLE}{os.sep}"
         yield f"{len(self.table):,} variants" + (f", {self.rate:,.0f}/s" if self.rate else "")
 
-    def summary(self) -> dict[str, Any]:
-        """The operating point, the variables, and how many variants there are."""
+    def inputs(self) -> dict[str, Any]:
+        """The operating point, array sizes and variables."""
         design = self.design
-        named = {name: f"{name} [{unit}]" if unit else name for name, unit in design.units.items()}
         return {
-            "torque_Nm": design.signed_torque,
-            "torque_range_Nm": design.torque_range,
-            "speed_rpm": design.speed,
+            UnitKey("torque", "N m"): design.signed_torque,
+            UnitKey("torque_range", "N m"): design.torque_range,
+            UnitKey("speed", "rpm"): design.speed,
             "friction": design.friction,
             "resolution": sizes(self.size),
-            "variables": {named[name]: limits for name, limits in design.bounds.items()},
-            "variants": len(self.table),
-            "failed_variants": self.table.failures(),
+            "variables": {UnitKey(name, design.units[name]): limits for name, limits in design.bounds.items()},
         }
+
+    def summary(self) -> dict[str, Any]:
+        """How many variants there are."""
+        return {"variants": len(self.table), "failed_variants": self.table.failures()}
 
     def write(self, folder: Path) -> None:
         """The best variants as `best.csv`."""
         with writing(folder / BEST):
             self.best.to_csv(folder / BEST)
 
-    def figures(self) -> dict[str, Any]:
+    def figures(self) -> Iterator[Figure]:
         """All figures that the results allow, of a table with a variant that did not fail."""
-        return figures_of(self.table) if len(self.best) else {}
+        if len(self.best):
+            yield from figures_of(self.table)
 
     def reported(self, folder: Path, facts: Sequence[tuple[str, str]], *, figures: bool) -> "SweepReport":
         """The best variants evaluated at the torques of the design file; writes the workbook and the interactive page.
@@ -141,13 +144,13 @@ class SweepReport(SweepResult):
         mesh: mesh of the evaluations; None if the variants are not evaluated.
         evaluations: unmodified pair and best variants by name, best variant last.
         torques: torques of the evaluations on the pinion [N m].
-        pages: files of the figures of each variant beside the unmodified pair, by the name of the variant.
+        pages: captions of the figures of each variant beside the unmodified pair, by its name and by file.
     """
 
     mesh: Mesh | None = None
     evaluations: side_by_side.Evaluations = field(default_factory=dict)
     torques: np.ndarray = field(default_factory=lambda: np.empty(0))
-    pages: Mapping[str, Sequence[Path]] = field(default_factory=dict)
+    pages: Mapping[str, Mapping[Path, str]] = field(default_factory=dict)
 
     def tables(self) -> Iterator[Table]:
         """Unmodified pair and best variants side by side, best variant first."""
@@ -180,38 +183,43 @@ class SweepReport(SweepResult):
         """Nothing."""
         return ()
 
-    def chapters(self) -> list[Chapter]:
+    def chapters(self) -> Iterator[Chapter]:
         """The best variants side by side, and a page of each of the first of them."""
-        count = min(CHOSEN, len(self.best))
-        return [_side_by_side(self.best), *map(self._page, range(count))] if len(self.best) else []
+        if len(self.best):
+            shown = self.best.take(range(min(_TABLE, len(self.best))))
+            _, *columns = shown.columns
+            rows = tuple((column.heading, *map(text, shown.column(column.name).tolist())) for column in columns)
+            yield Chapter("Best variants", tables=[Table(("", *_names(shown)), rows, "best first")], new_page=True)
+        yield from map(self._page, range(min(CHOSEN, len(self.best))))
 
-    def figures(self) -> dict[str, Any]:
+    def figures(self) -> Iterator[Figure]:
         """Figures of the evaluated variants, and of the sweep; a variant has one style in all."""
         from .. import plot
 
-        if self.mesh is None:
-            return super().figures()
-        with plot.same_styles(_styles(self.best)):
-            evaluated = side_by_side.figures(self.design, self.mesh, self.evaluations, self.torques)
-        return evaluated | super().figures()
+        if self.mesh is not None:
+            with plot.same_styles(_styles(self.best)):
+                yield from side_by_side.figures(self.design, self.mesh, self.evaluations, self.torques)
+        yield from super().figures()
 
-    def alone(self, folder: Path) -> dict[str, list[Path]]:
-        """Writes the figures of each variant beside the unmodified pair alone."""
+    def alone(self, folder: Path) -> dict[str, dict[Path, str]]:
+        """Writes the figures of each variant beside the unmodified pair alone; returns their captions by file."""
         from .. import plot
 
-        assert self.mesh is not None
         first, *others = self.evaluations
-        pages = {}
         with plot.same_styles(_styles(self.best)):
-            for name in others:
-                both = {first: self.evaluations[first], name: self.evaluations[name]}
-                axes = {
-                    "transmission_error": plot.transmission_error({one: of.cycle for one, of in both.items()}),
-                    "k_chart": plot.k_chart(self.mesh, side_by_side.flanks(both)),
-                }
-                named = {f"{kind}_{name.replace(' ', '_')}": ax for kind, ax in axes.items()}
-                pages[name] = save_figures(folder, named, bold=name)
-        return pages
+            return {name: save_figures(folder, self._alone(first, name), bold=name) for name in others}
+
+    def _alone(self, *names: str) -> Iterator[Figure]:
+        """Figures of two designs, named after the last."""
+        from .. import plot
+
+        both = {name: self.evaluations[name] for name in names}
+        figures = (
+            Figure.of(plot.transmission_error, {name: of.cycle for name, of in both.items()}),
+            Figure.of(plot.k_chart, self.mesh, side_by_side.flanks(both)),
+        )
+        for figure in figures:
+            yield dataclasses.replace(figure, name=f"{figure.name}_{names[-1].replace(' ', '_')}")
 
     def _page(self, place: int) -> Chapter:
         """One variant, and what it is among the others."""
@@ -221,38 +229,37 @@ class SweepReport(SweepResult):
             low, high = map(text, _range(self.table, column.name))
             rows.append((column.heading, text(best.column(column.name)[place]), low, high, column.better))
         header = ("", name, "least of all", "largest of all", "better is")
-        pictures = [figure(path) for path in self.pages.get(name, ())]
+        pictures = [picture(*each) for each in self.pages.get(name, {}).items()]
         return Chapter(name.capitalize(), tables=[Table(header, tuple(rows))], figures=pictures, new_page=True)
 
 
-def figures_of(table: SweepTable) -> dict[str, Any]:
-    """Axes of all figures that the results allow, of a table with a variant that did not fail."""
+def figures_of(table: SweepTable) -> Iterator[Figure]:
+    """All figures that the results allow, of a table with a variant that did not fail."""
     from .. import plot
 
-    heads = table.heads
-    size = len(table)
-    step = -(-size // _DRAWN)
-    best = table.best(_CHARTS)
-    axes: dict[str, Any] = {}
+    heads, size = table.heads, len(table)
+    step, best = -(-size // _DRAWN), table.best(_CHARTS)
+    note = f"1 in {step} of {size:,} variants".replace(",", "\u2009")
+
+    def noted(figure: Figure) -> Figure:
+        if step > 1:
+            axis = np.ravel(figure.axes)[0]
+            axis.set_title(note, loc="left", pad=32, fontsize=axis.xaxis.label.get_fontsize())
+        return figure
+
+    rows = np.arange(0, size, step)
     with plot.same_styles(_styles(best)):
         if len(heads) > 1:
-            rows = np.arange(0, size, step)
+            shown = rows
             if step > 1:  # the front is that of all variants, whichever of the others are drawn
-                rows = np.union1d(rows, table.pareto([head.name for head in heads[:3]]).column("variant"))
-            axes["pareto"] = plot.pareto(table.take(rows).values(*heads[:3]))
-        numbers = np.union1d(np.arange(0, size, step), best.column("variant"))  # the best of all, too
+                shown = np.union1d(rows, table.pareto([head.name for head in heads[:3]]).column("variant"))
+            yield noted(Figure.of(plot.pareto, table.take(shown).values(*heads[:3])))
+        numbers = np.union1d(rows, best.column("variant"))  # the best of all, too
         lines = table.take(numbers).values(*table.parameters, *heads)
-        axes["parallel_coordinates"] = plot.parallel_coordinates(lines, heads[0], numbers=numbers)
-        if len(heads) > 2:
-            # what is said of all results alike stands once, under the charts
+        yield noted(Figure.of(plot.parallel_coordinates, lines, heads[0], numbers=numbers))
+        if len(heads) > 2:  # the statistic that all results have in common stands once, under the charts
             spokes = {head.quantity: values for head, values in best.values(*heads).items()}
-            axes["radar"] = plot.radar(spokes, names=_names(best), note=heads[0].statistic)
-    if step > 1:
-        note = f"1 in {step} of {size:,} variants".replace(",", "\u2009")
-        for name in axes.keys() - {"radar"}:
-            axis = np.ravel(axes[name])[0]
-            axis.set_title(note, loc="left", pad=32, fontsize=axis.xaxis.label.get_fontsize())
-    return axes
+            yield Figure.of(plot.radar, spokes, names=_names(best), note=heads[0].statistic)
 
 
 def _names(best: SweepTable) -> list[str]:
@@ -264,17 +271,6 @@ def _styles(best: SweepTable) -> dict[str, int]:
     from .. import plot
 
     return {_UNMODIFIED: 0, **dict(zip(_names(best), plot.figure.APART))}
-
-
-def _side_by_side(best: SweepTable) -> Chapter:
-    shown = best.take(range(min(_TABLE, len(best))))
-    _, *columns = shown.columns
-    rows = tuple((column.heading, *_values(shown, column.name)) for column in columns)
-    return Chapter("Best variants", tables=[Table(("", *_names(shown)), rows, "best first")], new_page=True)
-
-
-def _values(table: SweepTable, name: str) -> list[str]:
-    return [text(value) for value in table.column(name).tolist()]
 
 
 def _range(table: SweepTable, name: str) -> tuple[float, float]:

@@ -1,18 +1,20 @@
 """Result of a wear study: tables, text, figures and files."""
 
-import csv
-import dataclasses
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
 from ..contact.status import reason
 from ..io import DesignFile, write_worn
+from ..io.results import write_csv
+from ..metrics import Quantity
 from ..microgeometry import AbstractModification
-from ..report import Table
+from ..numerics import UnitKey
+from ..report import Figure, Record, Table, numbers_of, table_of
 from ..vocabulary import quantity_of
 from ..wear import (
     Wear,
@@ -28,7 +30,7 @@ from ..wear import (
 from ..wear.quantities import blocks_are_short, number_of
 from . import manufactured, wear_scatter
 from .study import AbstractStudyResult
-from .summary_data import flanks_data
+from .summary_data import fields_data, flanks_data
 
 _QUANTITIES = (
     "ppte",
@@ -48,6 +50,22 @@ OVER_LIFE = "optimum over life"  # the design that is sought for the least mean 
 _PANEL, _HEIGHT = 80.0, 84.0  # [mm]
 _BEYOND = "*"  # marks lives that are longer than what was looked at
 _OF_MOTION = " Or the flanks vibrate without an orbit, or until coast flanks touch: run jaxgear dynamics."
+
+
+class _Life(NamedTuple):
+    """A wear history with numbers that several records need.
+
+    Attributes:
+        history: the wear history.
+        ppte: PPTE at the time steps [um], shape (steps,).
+        volume: worn volume per flank in the end [mm3], shape (gears, parts).
+        factors: dynamic factor at the time steps, shape (steps,); empty where nothing vibrates.
+    """
+
+    history: WearHistory
+    ppte: np.ndarray
+    volume: np.ndarray
+    factors: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -74,70 +92,58 @@ class WearResult(AbstractStudyResult):
     histories: Mapping[str, WearHistory]
     scatters: Mapping[str, wear_scatter.Samples]
 
-    def _numbers(self, history: WearHistory) -> dict[str, float]:
-        """Scalar results of a wear history, by name and unit."""
-        ppte, settings = np.asarray(over_life(history, "ppte")), self.settings
-        volume = np.asarray(worn_volume(history))[-1]
-        found = {
-            "pinion_wear_depth_um": wear_depth(history, "pinion")[-1],
-            "wheel_wear_depth_um": wear_depth(history, "wheel")[-1],
-            "new_ppte_um": ppte[0],
-            "max_ppte_over_life_um": ppte.max(),
-            "worn_ppte_um": ppte[-1],
-            "mean_ppte_over_life_um": mean_over_life(history, "ppte"),
-            "pinion_worn_volume_per_flank_mm3": volume[0].sum(),
-            "wheel_worn_volume_per_flank_mm3": volume[1].sum(),
-            "volume_by_tip_corners_share": volume[:, 1].sum() / max(volume.sum(), np.finfo(float).tiny),
-            "wear_depth_error_um": history.error[-1],
-            **{
-                f"{name}_MPa": number_of(name, history, settings)
-                for name in ("max_pressure_over_life", "max_pressure_over_life_error")
-            },
-            "worn_flank_pressure_MPa": over_life(history, "max_flank_pressure")[-1],
-            "worn_flank_pressure_error_MPa": pressure_error(history)[-1],
+    def _lives(self) -> dict[str, _Life]:
+        return {
+            name: _Life(
+                history,
+                np.asarray(over_life(history, "ppte")),
+                np.asarray(worn_volume(history))[-1],
+                np.asarray([] if history.dynamic_factor is None else over_life(history, "dynamic_factor")),
+            )
+            for name, history in self.histories.items()
         }
-        if history.dynamic_factor is not None:
-            factors = np.asarray(over_life(history, "dynamic_factor"))
-            found["new_dynamic_factor"], found["worn_dynamic_factor"] = factors[0], factors[-1]
-            found["max_dynamic_factor_over_life"] = factors.max()
-        if settings.depth_limit is not None:
-            found["life_to_depth_revolutions"] = life_to_depth(history, settings.depth_limit)
-        if settings.ppte_limit is not None:
-            found["life_to_ppte_revolutions"] = life_to(history, "ppte", settings.ppte_limit)
-        return {name: float(value) for name, value in found.items()}
 
-    def tables(self) -> list[Table]:
-        """The lives of all designs, and their scatter over manufactured pairs where the file has tolerances."""
-        return [self._table(), *wear_scatter.tables(self.design, self.settings, self.scatters)]
-
-    def _table(self) -> Table:
-        """One row per design."""
+    def _records(self) -> Iterator[Record[_Life]]:
+        """Scalar results of a wear history, in the order of the table."""
         settings = self.settings
-        title = f"{self.design.title}: {float(settings.revolutions):.3g} revolutions at {self._loads()}"
-        columns = {
-            "pinion_wear_depth_um": "depth\npinion\n[um]",
-            "wheel_wear_depth_um": "depth\nwheel\n[um]",
-            "wear_depth_error_um": "its\nerror\n[um]",
-            "new_ppte_um": "PPTE\nnew\n[um]",
-            "max_ppte_over_life_um": "PPTE\nworst\n[um]",
-            "worn_ppte_um": "PPTE\nworn\n[um]",
-            "mean_ppte_over_life_um": "PPTE\nmean\n[um]",
-        }
+        ended, depth, ppte = float(settings.revolutions), settings.depth_limit, settings.ppte_limit
+        tiny = np.finfo(float).tiny
+        yield Record("pinion_wear_depth", "um", lambda of: wear_depth(of.history, "pinion")[-1], "depth\npinion\n[um]")
+        yield Record("wheel_wear_depth", "um", lambda of: wear_depth(of.history, "wheel")[-1], "depth\nwheel\n[um]")
+        yield Record("wear_depth_error", "um", lambda of: of.history.error[-1], "its\nerror\n[um]")
+        yield Record("new_ppte", "um", lambda of: of.ppte[0], "PPTE\nnew\n[um]")
+        yield Record("max_ppte_over_life", "um", lambda of: of.ppte.max(), "PPTE\nworst\n[um]")
+        yield Record("worn_ppte", "um", lambda of: of.ppte[-1], "PPTE\nworn\n[um]")
+        yield Record("mean_ppte_over_life", "um", lambda of: mean_over_life(of.history, "ppte"), "PPTE\nmean\n[um]")
+        yield Record("pinion_worn_volume_per_flank", "mm3", lambda of: of.volume[0].sum())
+        yield Record("wheel_worn_volume_per_flank", "mm3", lambda of: of.volume[1].sum())
+        yield Record("volume_by_tip_corners_share", "", lambda of: of.volume[:, 1].sum() / max(of.volume.sum(), tiny))
+        for name in ("max_pressure_over_life", "max_pressure_over_life_error"):
+            yield Record(name, "MPa", partial(_pressure, name, settings))
+        yield Record("worn_flank_pressure", "MPa", lambda of: over_life(of.history, "max_flank_pressure")[-1])
+        yield Record("worn_flank_pressure_error", "MPa", lambda of: pressure_error(of.history)[-1])
         if settings.dynamics is not None:
-            columns |= {"new_dynamic_factor": "K_v new", "max_dynamic_factor_over_life": "K_v worst"}
-        limits = {
-            "life_to_depth_revolutions": (settings.depth_limit, "revolutions\nto {:g} um\ndepth"),
-            "life_to_ppte_revolutions": (settings.ppte_limit, "revolutions\nto PPTE of\n{:g} um"),
-        }
-        columns |= {key: text.format(float(limit)) for key, (limit, text) in limits.items() if limit is not None}
-        result = Table(("design", *columns.values()), title=title)
-        ended = float(settings.revolutions)
-        for name, history in self.histories.items():
-            numbers = self._numbers(history)
-            result.add_row(name, *(_cell(key, numbers[key], ended) for key in columns))
-            if ended < numbers.get("life_to_depth_revolutions", 0.0) < np.inf:
-                result.note = f"{_BEYOND} beyond wear.revolutions, extrapolated at the rate of the last block"
-        return result
+            yield Record("new_dynamic_factor", "", lambda of: of.factors[0], "K_v new")
+            yield Record("worn_dynamic_factor", "", lambda of: of.factors[-1])
+            yield Record("max_dynamic_factor_over_life", "", lambda of: of.factors.max(), "K_v worst")
+        if depth is not None:  # which goes on behind the last block
+            heading = f"revolutions\nto {float(depth):g} um\ndepth"
+            shown = partial(_life_text, ended=ended, beyond="never")
+            yield Record("life_to_depth", "revolutions", lambda of: life_to_depth(of.history, depth), heading, shown)
+        if ppte is not None:  # which is not known behind it
+            heading = f"revolutions\nto PPTE of\n{float(ppte):g} um"
+            shown = partial(_life_text, ended=ended, beyond=f"> {ended:.3g}")
+            yield Record("life_to_ppte", "revolutions", lambda of: life_to(of.history, "ppte", ppte), heading, shown)
+
+    def tables(self) -> Iterator[Table]:
+        """The lives of all designs, and their scatter over manufactured pairs where the file has tolerances."""
+        settings, lives = self.settings, self._lives()
+        title = f"{self.design.title}: {float(settings.revolutions):.3g} revolutions at {self._loads()}"
+        table = table_of(list(self._records()), lives, title, "design")
+        if any(_BEYOND in cell for row in table.rows for cell in row[1:]):
+            table.note = f"{_BEYOND} beyond wear.revolutions, extrapolated at the rate of the last block"
+        yield table
+        yield from wear_scatter.tables(self.design, settings, self.scatters)
 
     def _loads(self) -> str:
         """Under what the flanks wear."""
@@ -205,88 +211,73 @@ class WearResult(AbstractStudyResult):
                 yield f"BLOCKS TOO LONG: {name}, flanks overshoot; do not use its numbers. Take more blocks."
         yield from wear_scatter.failures(self.scatters)
 
-    def summary(self) -> dict[str, Any]:
-        """The lives of all designs, with what wears them."""
+    def inputs(self) -> dict[str, Any]:
+        """Load, settings and tolerances."""
         settings = self.settings
+        return {
+            UnitKey("torque", "N m"): self.design.torque,
+            "settings": fields_data(replace(settings, largest_increment=None)),
+            **({} if settings.loads is None else {"shares_of_revolutions": self._shares()}),
+            UnitKey("largest_increment", "um"): settings.largest_increment,
+            **(manufactured.tolerances(self.design) if self.scatters else {}),
+        }
+
+    def summary(self) -> dict[str, Any]:
+        """The lives of all designs."""
+        records = list(self._records())
         designs = {
             name: {
-                **self._numbers(history),
-                "blocks": len(history.revolutions) - 1,
+                **numbers_of(records, life),
+                "blocks": len(life.history.revolutions) - 1,
                 **flanks_data(*self.designs[name]),
                 **(wear_scatter.summary(self.scatters[name]) if name in self.scatters else {}),
             }
-            for name, history in self.histories.items()
+            for name, life in self._lives().items()
         }
-        return {
-            "torque_Nm": self.design.torque,
-            "settings": _without_none(dataclasses.replace(settings, largest_increment=None)),
-            **({} if settings.loads is None else {"shares_of_revolutions": self._shares()}),
-            "largest_increment_um": settings.largest_increment,
-            **(manufactured.tolerances(self.design) if self.scatters else {}),
-            **({"optimum_over_life": self._sought()} if OVER_LIFE in self.designs else {}),
-            "designs": designs,
-        }
+        return {**({"optimum_over_life": self._sought()} if OVER_LIFE in self.designs else {}), "designs": designs}
 
     def write(self, folder: Path) -> None:
         """Every time step and every flank of every design: `life.csv`, `worn_flanks.csv` and `worn_flanks.parquet`."""
-        self._write_lives(folder / "life.csv")
+        vibrates = self.settings.dynamics is not None
+        known = [quantity_of(name) for name in (*_QUANTITIES, *(["dynamic_factor"] if vibrates else []))]
+        depths = "pinion_wear_depth_um", "wheel_wear_depth_um", "wear_depth_error_um", "flank_pressure_error_MPa"
+        header = "design", "revolutions", *depths, *(quantity.key for quantity in known)
+        write_csv(folder / "life.csv", header, self._time_steps(known))
         for name in ("worn_flanks.csv", "worn_flanks.parquet"):
             write_worn(folder / name, self.histories)
 
-    def _write_lives(self, path: Path) -> None:
-        """Every time step of every design as CSV."""
-        vibrates = self.settings.dynamics is not None
-        known = [quantity_of(name) for name in (*_QUANTITIES, *(["dynamic_factor"] if vibrates else []))]
-        with path.open("w", newline="", encoding="utf-8") as file:
-            writer = csv.writer(file)
-            depths = "pinion_wear_depth_um", "wheel_wear_depth_um", "wear_depth_error_um", "flank_pressure_error_MPa"
-            writer.writerow(["design", "revolutions", *depths, *(quantity.key for quantity in known)])
-            for name, history in self.histories.items():
-                columns = [
-                    history.revolutions,
-                    wear_depth(history, "pinion"),
-                    wear_depth(history, "wheel"),
-                    history.error,
-                ]
-                columns += [pressure_error(history)]
-                columns += [over_life(history, quantity) for quantity in known]
-                for row in zip(*map(np.asarray, columns)):
-                    writer.writerow([name, *(f"{value:.7g}" for value in row)])
+    def _time_steps(self, known: Sequence[Quantity]) -> Iterator[tuple[Any, ...]]:
+        """Rows of `life.csv`."""
+        for name, history in self.histories.items():
+            depths = wear_depth(history, "pinion"), wear_depth(history, "wheel"), history.error, pressure_error(history)
+            columns = history.revolutions, *depths, *(over_life(history, quantity) for quantity in known)
+            yield from ((name, *row) for row in zip(*(np.asarray(column, float) for column in columns)))
 
-    def figures(self) -> dict[str, Any]:
+    def figures(self) -> Iterator[Figure]:
         """Flanks at several time steps, PPTE and depth over the life, and the scatter over manufactured pairs."""
         from .. import plot
 
-        shown = list(self.histories)
-        size: dict[str, Any] = {"columns": len(shown), "width": _PANEL * len(shown), "height": _HEIGHT}
-        axes: dict[str, Any] = {}
         for gear in ("pinion", "wheel"):
-            with plot.figure.report_axes(None, **size) as panels:
-                for number, (panel, name) in enumerate(zip(np.ravel(panels), shown)):
-                    plot.worn_flank(self.histories[name], gear, panel, title=name)
-                    panel.set_ylabel(panel.get_ylabel() if number == 0 else "")
-            axes[f"worn_{gear}"] = panels
-        axes["ppte_over_life"] = plot.wear_history(self.histories, "ppte")
-        axes["depth_over_life"] = plot.wear_history(self.histories, "wear_depth")
+
+            def draw(panel: Any, name: str, gear: Any = gear) -> None:
+                plot.worn_flank(self.histories[name], gear, panel, title=name)
+
+            drawn = plot.panels(draw, self.histories, width=_PANEL, height=_HEIGHT)
+            yield Figure(f"worn_{gear}", f"Flank of the {gear} at several time steps.", drawn)
+        yield Figure("ppte_over_life", "PPTE over the life.", plot.wear_history(self.histories, "ppte"))
+        depths = plot.wear_history(self.histories, "wear_depth")
+        yield Figure("depth_over_life", "Depth of wear over the life.", depths)
         if self.settings.dynamics is not None:
-            axes["dynamic_factor_over_life"] = plot.wear_history(self.histories, "dynamic_factor")
-        return axes | wear_scatter.figures(self.scatters)
+            caption = "Largest mesh force of the steady motion over the static one, over the life."
+            factors = plot.wear_history(self.histories, "dynamic_factor")
+            yield Figure("dynamic_factor_over_life", caption, factors)
+        yield from wear_scatter.figures(self.scatters)
 
 
-def _cell(key: str, value: float, ended: float) -> str:
-    """A number of a life of so many revolutions."""
-    if not key.endswith("revolutions"):
-        return f"{value:.3f}"
-    if np.isposinf(value):  # the depth goes on, PPTE is not known any further
-        return "never" if key == "life_to_depth_revolutions" else f"> {ended:.3g}"
-    return f"{value:.3g}" + f" {_BEYOND}" * (value > ended)  # NaN where the flanks are not known
+def _pressure(name: str, settings: Wear, life: _Life) -> Any:
+    return number_of(name, life.history, settings)
 
 
-def _without_none(settings: Any) -> dict[str, Any]:
-    """Fields of settings, and of settings within them."""
-    given = {field.name: getattr(settings, field.name) for field in dataclasses.fields(settings)}
-    return {
-        name: _without_none(value) if dataclasses.is_dataclass(value) else value
-        for name, value in given.items()
-        if value is not None
-    }
+def _life_text(value: float, ended: float, beyond: str) -> str:
+    """Revolutions of a life, which was computed to `ended`; NaN where the flanks are not known."""
+    return beyond if np.isposinf(value) else f"{value:.3g}" + f" {_BEYOND}" * (value > ended)

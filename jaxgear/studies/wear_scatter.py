@@ -1,6 +1,7 @@
 """Scatter of the wear of designs over manufactured gears within the tolerances of the file."""
 
 from collections.abc import Callable, Iterator, Mapping
+from functools import partial
 from typing import Any
 
 import jax
@@ -11,8 +12,8 @@ from ..conditions.cases import Loads
 from ..contact import Mesh
 from ..io import DesignFile
 from ..microgeometry import AbstractModification
-from ..numerics import Quantile, program, real
-from ..report import Table
+from ..numerics import Quantile, UnitKey, program, real
+from ..report import Figure, Record, Table, table_of
 from ..tolerance import ManufacturedGears
 from ..wear import WEAR_QUANTITIES, Wear
 from ..wear.quantities import MOST_LIVES, number_of
@@ -97,19 +98,21 @@ def asked(settings: Wear) -> list[str]:
 
 def tables(design: DesignFile, settings: Wear, scatters: Mapping[str, Samples]) -> Iterator[Table]:
     """One row per design; nothing without a table [tolerance]."""
-    if not scatters:
-        return
-    title = f"{_pairs(design, scatters)}, the same for every design"
-    headings = ["mean PPTE\n[um]", "95 %\nbelow", "depth\n[um]", "95 %\nbelow"]
-    lives = asked(settings)[2:]
+    if scatters:
+        records = list(_records(settings))
+        yield table_of(records, scatters, f"{_pairs(design, scatters)}, the same for every design", "design")
+
+
+def _records(settings: Wear) -> Iterator[Record[Samples]]:
+    for name, heading in ((_PPTE, "mean PPTE\n[um]"), (_DEPTH, "depth\n[um]")):
+        yield Record(name, "", partial(_mean, name=name), heading)
+        yield Record(name, "", partial(_bound, name=name), "95 %\nbelow")
     limits = {"life_to_depth": "95 % last,\n{:g} um deep", "life_to_ppte": "95 % last,\nPPTE {:g} um"}
-    headings += [limits[name].format(float(getattr(settings, _LIVES[name][0]))) for name in lives]
-    result = Table(("design", *headings, "failed"), title=title)
-    for name, samples in scatters.items():
-        cells = [f"{of(samples, key):.3f}" for key in (_PPTE, _DEPTH) for of in (_mean, _bound)]
-        cells += [_life_text(settings, key, _lasts(samples, key, _LEVEL)) for key in lives]
-        result.add_row(name, *cells, str(failed(samples)))
-    yield result
+    for name in asked(settings)[2:]:
+        heading = limits[name].format(float(getattr(settings, _LIVES[name][0])))
+        shown = partial(_life_text, settings, name)
+        yield Record(name, "", partial(_lasts, name=name, share=_LEVEL), heading, shown)
+    yield Record("failed", "", failed, "failed", "d")
 
 
 def lines(design: DesignFile, scatters: Mapping[str, Samples]) -> Iterator[str]:
@@ -137,7 +140,7 @@ def summary(samples: Samples) -> dict[str, Any]:
     """The scatter of a design as plain data; q95 is what 95 % of the pairs do not pass."""
     found: dict[str, Any] = {"pairs": len(samples[_PPTE]), "failed": failed(samples)}
     for name in samples:
-        values, key = samples[name], f"{name}_{WEAR_QUANTITIES[name].unit}"
+        values, key = samples[name], UnitKey(name, WEAR_QUANTITIES[name].unit)
         if name in _LIVES:  # they end at the simulated revolutions: a mean would depend on these
             found[key] = {"half_last": _lasts(samples, name, 0.5), "95_percent_last": _lasts(samples, name, _LEVEL)}
             continue
@@ -150,14 +153,14 @@ def failed(samples: Samples) -> int:
     return int(np.sum(~np.isfinite(samples[_PPTE])))
 
 
-def figures(scatters: Mapping[str, Samples]) -> dict[str, Any]:
-    """Axes with the scatter of all designs; empty without a table [tolerance]."""
-    if not scatters:
-        return {}
+def figures(scatters: Mapping[str, Samples]) -> Iterator[Figure]:
+    """Figure of the scatter of all designs; nothing without a table [tolerance]."""
     from .. import plot
 
-    samples = {name: of[_PPTE] for name, of in scatters.items()}
-    return {"life_ppte_distribution": plot.ppte_distribution(samples, of=_PPTE)}
+    if scatters:
+        caption = "Share of the manufactured pairs whose mean PPTE over the life stays below a value."
+        drawn = plot.ppte_distribution({name: of[_PPTE] for name, of in scatters.items()}, of=_PPTE)
+        yield Figure("life_ppte_distribution", caption, drawn)
 
 
 def _mean(samples: Samples, name: str) -> float:

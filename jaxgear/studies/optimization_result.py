@@ -1,29 +1,36 @@
-"""Text, tables and figures of an optimum, alike for every method."""
+"""Result of an optimization: text, tables and figures of an optimum, alike for every method."""
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import chain, repeat
+from pathlib import Path
 from typing import Any
 
 import jax
 import numpy as np
 
 from ..contact import Mesh, Side
-from ..io import DesignFile, describe
+from ..io import DesignFile, describe, write_front
 from ..io.results import unit_of
 from ..metrics import Finding, Quantity, flank_surface
 from ..microgeometry import AbstractModification
+from ..numerics import UnitKey
 from ..optimize import Front, Optimum, Problem, Projection
 from ..optimize.result import PENALIZED
 from ..optimize.verdict import over_cases
-from ..report import Table
+from ..report import Figure, Table, text
 from ..vocabulary import quantities
 from . import side_by_side
+from .comparison_result import ComparisonResult
 from .evaluation import response_surface
+from .gear_data import mounting
 from .summary_data import flanks_data
 
 _SAME = 0.05  # [%]; a smaller change rounds to nothing
+_USUAL = "none, inputs and results lie within the usual ranges"
+_SHOWN_BOUNDS = 8
+Rows = Iterator[tuple[str, str]]  # label and text
 _NO_RATIO = ("degC",)  # units whose zero is a convention
 
 
@@ -65,7 +72,7 @@ class Judged:
         return f"{before:{form}} -> {after:{form}} {self.of.unit}".rstrip() + f": {said}" * bool(said)
 
 
-def gains(evaluations: side_by_side.Evaluations, problem: Problem | None) -> Iterator[tuple[str, str]]:
+def gains(evaluations: side_by_side.Evaluations, problem: Problem | None) -> Rows:
     """Rows of label and text: the objectives, then PPTE where it is none of them, each by finite elements too.
 
     Args:
@@ -126,7 +133,7 @@ def front_table(front: Front, evaluations: side_by_side.Evaluations, of_variable
     return result
 
 
-def front_rows(front: Front, signs: Sequence[int], evaluations: side_by_side.Evaluations) -> Iterator[tuple[str, str]]:
+def front_rows(front: Front, signs: Sequence[int], evaluations: side_by_side.Evaluations) -> Rows:
     """Rows on the compromise of a front, and on the designs of the front that beat the other designs.
 
     Args:
@@ -147,9 +154,7 @@ _DIGITS = {"um": ".2f", "mm": ".3f"}
 _MOST = 4  # numbers of a curve that are written out
 
 
-def to_grind(
-    mesh: Mesh, pinion: AbstractModification, wheel: AbstractModification, design: str = ""
-) -> Iterator[tuple[str, str]]:
+def to_grind(mesh: Mesh, pinion: AbstractModification, wheel: AbstractModification, design: str = "") -> Rows:
     """Rows of gear and text, one for every part of both modifications.
 
     Args:
@@ -158,10 +163,13 @@ def to_grind(
         design: what they are called, where several designs are listed.
     """
     for gear, side, modification in zip(("pinion", "wheel"), mesh.sides, (pinion, wheel)):
-        label = f"{gear}, {design}" if design else gear
-        for part in describe(modification) or [{}]:
-            yield label, _part(part, side, modification) if part else _NOTHING
-            label = ""
+        parts = [_part(part, side, modification) for part in describe(modification)] or [_NOTHING]
+        yield from _under(f"{gear}, {design}" if design else gear, parts)
+
+
+def _under(label: str, lines: Iterable[str]) -> Rows:
+    """Rows of which the first has a label."""
+    return zip(chain((label,), repeat("")), lines)
 
 
 def _part(part: Mapping[str, Any], side: Side, modification: AbstractModification) -> str:
@@ -219,53 +227,10 @@ def _number(value: Any, unit: str) -> str:
     return str(value)
 
 
-_SHOWN_BOUNDS = 8
-
-
-def first_screen(
-    file: DesignFile,
-    optimum: Optimum,
-    front: Front | None,
-    projection: Projection | None,
-    evaluations: side_by_side.Evaluations,
-    *,
-    searched_at: int,
-    unusual: Iterable[Finding],
-    trust: Iterable[tuple[str, str]],
-) -> Iterator[Table]:
-    """Summary tables of an optimization: modification to grind, gain, and checks of the result.
-
-    Args:
-        file: the design file.
-        optimum: result of the search.
-        front: Pareto front of which the optimum is the compromise; None without.
-        projection: projection of the optimum on a curve; None without.
-        evaluations: designs by their names, the first of which is unmodified.
-        searched_at: number of positions at which the search began.
-        unusual: findings about the design.
-        trust: further rows of the checks, such as findings.
-    """
-    name, best = side_by_side.main_name(evaluations), side_by_side.main(evaluations)
-    rows = [*_overloads(unusual, optimum), *to_grind(optimum.mesh, best.pinion, best.wheel)]
-    if projection is not None:
-        rows += to_grind(optimum.mesh, projection.pinion, projection.wheel, f"as {projection.curve}")
-    yield Table(("", ""), tuple(rows), f"Modification to grind: {name} of {file.title}")
-    gained = [*gains(evaluations, optimum.problem), *_rounding(file, optimum)]
-    if front is not None and optimum.problem is not None:
-        gained += front_rows(front, [of.sign for of in optimum.problem.objectives], evaluations)
-    yield Table(("", ""), tuple(gained), f"Gain at {file.load_in_words}: unmodified -> {name}")
-    judged_by = (
-        *_feasibility(optimum),
-        *_bounds(file, optimum),
-        *zip(chain(("grid",), repeat("")), _positions(optimum, evaluations, searched_at)),
-    )
-    yield Table(("", ""), (*judged_by, *trust), "Checks of the result")
-
-
 _LIMITED = {"corner pressure": "max_corner_pressure", "flank pressure": "max_flank_pressure"}
 
 
-def _overloads(unusual: Iterable[Finding], optimum: Optimum) -> Iterator[tuple[str, str]]:
+def _overloads(unusual: Iterable[Finding], optimum: Optimum) -> Rows:
     """Rows about pressures that no flank endures, and how a search keeps below them."""
     for finding in unusual:
         name = _LIMITED.get(finding.key)
@@ -274,7 +239,7 @@ def _overloads(unusual: Iterable[Finding], optimum: Optimum) -> Iterator[tuple[s
             yield "overload", f"{finding.key} {finding.number} exceeds {finding.usual.high:g} MPa; limit it: {limit}"
 
 
-def _rounding(file: DesignFile, optimum: Optimum) -> Iterator[tuple[str, str]]:
+def _rounding(file: DesignFile, optimum: Optimum) -> Rows:
     """A row about the steps of the variables, and what they cost."""
     rounding = optimum.rounding
     if rounding is None:
@@ -289,115 +254,172 @@ def _rounding(file: DesignFile, optimum: Optimum) -> Iterator[tuple[str, str]]:
     yield "rounding", f"to steps of {' and '.join(steps)}: {optimum.objective_name} {cost}{digits}"
 
 
-def search_lines(optimum: Optimum, front: Front | None, projection: Projection | None) -> Iterator[str]:
-    """Lines on the search: iterations, projection, first-order optimality and number of analyses."""
-    if optimum.objective_name.endswith(PENALIZED):  # no other design pays it
-        yield f"{optimum.objective_name}: {optimum.objective:.4g}"
-    for step, state in enumerate(optimum.iterations):
-        yield (
-            f"iteration {step}: PPTE {state.ppte:.3f} um (lower limit {state.limit:.3f}), up to "
-            f"{state.max_relief:.2f} um removed, {state.max_flank_pressure:.0f} MPa on the flank, "
-            f"{state.max_corner_pressure:.0f} at the corner"
+@dataclass(frozen=True)
+class OptimizationResult(ComparisonResult):
+    """Result of a search: the optimum beside the designs with which it is compared.
+
+    Attributes:
+        optimum: result of the search.
+        front: Pareto front of which the optimum is the compromise; None without one.
+        projection: projection of the optimum on a curve; None without one.
+        searched_at: number of positions at which the search began.
+    """
+
+    optimum: Optimum
+    front: Front | None
+    projection: Projection | None
+    searched_at: int
+
+    def summary(self) -> dict[str, Any]:
+        """Every number of the gears and designs, and the optimum."""
+        optimum, projection, file = self.optimum, self.projection, self.design
+        data = optimum.summary()
+        data["parameters"] = {_with_unit(file, name): value for name, value in optimum.parameters.items()}
+        if set(optimum.parameters) == set(file.bounds):
+            data["bounds"] = {_with_unit(file, name): limits for name, limits in file.bounds.items()}
+        if optimum.iterations:
+            names = ("ppte", "limit", "max_relief", "max_flank_pressure", "max_corner_pressure")
+            data["iterations"] = [{name: getattr(state, name) for name in names} for state in optimum.iterations]
+        if projection is not None:
+            data["projection"] = {
+                "curve": projection.curve,
+                quantities["ppte"].key: projection.ppte,
+                UnitKey("loss", "um"): projection.loss,
+                UnitKey("misfit", "um"): projection.misfit,
+                **flanks_data(projection.pinion, projection.wheel),
+            }
+        return {**super().summary(), "optimum": data}
+
+    def write(self, folder: Path) -> None:
+        """The flanks of all designs as `flanks.csv`, and a front as `front.csv`."""
+        super().write(folder)
+        if self.front is not None:
+            write_front(folder / "front.csv", self.front)
+
+    def figures(self) -> Iterator[Figure]:
+        """Designs, their scatter over manufactured gears, the optimum over all loads, and the search."""
+        from .. import plot
+
+        yield from super().figures()
+        mesh, optimum, front = self.mesh, self.optimum, self.front
+        torques, errors = response_surface(mesh, self.design.torque, optimum.pinion, optimum.wheel)
+        unloaded, name = optimum.cycle.unloaded_transmission_error, side_by_side.main_name(self.evaluations)
+        about = {"design_torque": float(optimum.cycle.torque), "design": name}
+        yield Figure.of(plot.response_surface, mesh.phase, torques, errors, unloaded, **about)
+        if front is None:  # the compromise of a front is measured by the front so far, which moves
+            yield Figure.of(plot.convergence, {optimum.method: optimum})
+        else:
+            others = others_of(front, self.evaluations)
+            yield replace(Figure.of(plot.optimum_front, front, chosen=front.chosen, others=others), name="front")
+        if optimum.iterations:
+            yield Figure.of(plot.iterations_relief, mesh, optimum)
+            yield Figure.of(plot.iterations_transmission_error, optimum, mesh.phase)
+
+    def headlines(self) -> Iterator[Table]:
+        """Modification to grind, gain, and checks of the result."""
+        optimum, projection, evaluations = self.optimum, self.projection, self.evaluations
+        name, best = side_by_side.main_name(evaluations), side_by_side.main(evaluations)
+        rows = [*_overloads(self.unusual[name], optimum), *to_grind(optimum.mesh, best.pinion, best.wheel)]
+        if projection is not None:
+            rows += to_grind(optimum.mesh, projection.pinion, projection.wheel, f"as {projection.curve}")
+        yield Table(("", ""), tuple(rows), f"Modification to grind: {name} of {self.design.title}")
+        gained = [*gains(evaluations, optimum.problem), *_rounding(self.design, optimum)]
+        if self.front is not None and optimum.problem is not None:
+            gained += front_rows(self.front, [of.sign for of in optimum.problem.objectives], evaluations)
+        yield Table(("", ""), tuple(gained), f"Gain at {self.design.load_in_words}: unmodified -> {name}")
+        findings = [line.removeprefix(side_by_side.WARNING) for line in self.findings()]
+        checks = (
+            *_under("limits", _feasibility(optimum)),
+            *_under("variables", _bounds(self.design, optimum)),
+            *_under("grid", self._grid()),
+            *(("failed", line) for line in super().failures()),
+            *(("note", line) for line in self.notes()),
+            *(("warning", line) for line in findings),
+            *([] if findings else [("warnings", _USUAL)]),
         )
-    if projection is not None:
-        yield from str(projection).splitlines()
-    left = optimum.optimality if front is None else float(np.nanmax(front.optimality, initial=0.0))
-    if np.isfinite(left):
-        of = (
-            f"{left:.2g} {optimum.objective_unit}".rstrip()
-            if front is None
-            else f"at most {left:.2g} of the front's span"
-        )
-        yield f"first-order optimality: {of}, the largest predicted decrease over the full range of a variable"
-    price = "one with gradient counts as three, each further gradient as two"
-    yield f"{optimum.evaluations} contact analyses by method {optimum.method} ({price})"
+        yield Table(("", ""), checks, "Checks of the result")
+
+    def tables(self) -> Iterator[Table]:
+        """The designs side by side, and those of a front."""
+        yield from super().tables()
+        if self.front is not None:
+            yield front_table(self.front, self.evaluations, self.design.units)
+
+    def verdict(self) -> Iterator[str]:
+        """How the gears are mounted; the headlines say the rest."""
+        yield mounting(self.design)
+
+    def details(self) -> Iterator[str]:
+        """The search: iterations, projection, first-order optimality and number of analyses."""
+        optimum, front = self.optimum, self.front
+        if optimum.objective_name.endswith(PENALIZED):  # no other design pays it
+            yield f"{optimum.objective_name}: {optimum.objective:.4g}"
+        for step, state in enumerate(optimum.iterations):
+            yield (
+                f"iteration {step}: PPTE {state.ppte:.3f} um (lower limit {state.limit:.3f}), up to "
+                f"{state.max_relief:.2f} um removed, {state.max_flank_pressure:.0f} MPa on the flank, "
+                f"{state.max_corner_pressure:.0f} at the corner"
+            )
+        if self.projection is not None:
+            yield from str(self.projection).splitlines()
+        left = optimum.optimality if front is None else float(np.nanmax(front.optimality, initial=0.0))
+        if np.isfinite(left):
+            unit = f" {optimum.objective_unit}".rstrip()
+            of = f"{left:.2g}{unit}" if front is None else f"at most {left:.2g} of the front's span"
+            yield f"first-order optimality: {of}, the largest predicted decrease over the full range of a variable"
+        price = "one with gradient counts as three, each further gradient as two"
+        yield f"{optimum.evaluations} contact analyses by method {optimum.method} ({price})"
+
+    def failures(self) -> Iterator[str]:
+        """Results that did not converge, and limits that are not met."""
+        yield from super().failures()
+        if not self.optimum.feasible:
+            yield "constraints are not met"
+
+    def checks(self) -> Iterator[tuple[str, str]]:
+        """Convergence of all designs, their numbers by finite elements, and the end of the search."""
+        yield from super().checks()
+        optimum = self.optimum
+        yield "all constraints met", text(optimum.feasible)
+        yield "change of the objective at twice the positions, in its unit", text(optimum.grid_change)
+        yield "first-order optimality, in the unit of the objective", text(optimum.optimality)
+        yield "contact analyses", text(optimum.evaluations)
+
+    def _grid(self) -> Iterator[str]:
+        optimum, evaluations = self.optimum, self.evaluations
+        said = f"searched at {self.searched_at} positions, " * (self.searched_at != optimum.positions)
+        change = f"the objective by {optimum.grid_change:+.2g} {optimum.objective_unit}".rstrip()
+        names = dict.fromkeys([next(iter(evaluations)), side_by_side.main_name(evaluations)])
+        shown = {name: evaluations[name] for name in names}
+        first, *others = side_by_side.grid(shown, change * bool(np.isfinite(optimum.grid_change)))
+        yield from (said + first, *others)
 
 
-def summary(file: DesignFile, optimum: Optimum, projection: Projection | None) -> dict[str, Any]:
-    """The optimum as plain data."""
-    data = optimum.summary()
-    data["parameters"] = {_with_unit(file, name): value for name, value in optimum.parameters.items()}
-    if set(optimum.parameters) == set(file.bounds):
-        data["bounds"] = {_with_unit(file, name): limits for name, limits in file.bounds.items()}
-    if optimum.iterations:
-        names = ("ppte", "limit", "max_relief", "max_flank_pressure", "max_corner_pressure")
-        data["iterations"] = [{name: getattr(state, name) for name in names} for state in optimum.iterations]
-    if projection is not None:
-        data["projection"] = {
-            "curve": projection.curve,
-            "ppte_um": projection.ppte,
-            "loss_um": projection.loss,
-            "misfit_um": projection.misfit,
-            **flanks_data(projection.pinion, projection.wheel),
-        }
-    return data
-
-
-def figures(
-    mesh: Mesh, torque: float, optimum: Optimum, front: Front | None, evaluations: side_by_side.Evaluations
-) -> dict[str, Any]:
-    """Axes of the search and of the optimum over all loads, by name."""
-    from .. import plot
-
-    torques, errors = response_surface(mesh, torque, optimum.pinion, optimum.wheel)
-    unloaded, name = optimum.cycle.unloaded_transmission_error, side_by_side.main_name(evaluations)
-    axes: dict[str, Any] = {
-        "response_surface": plot.response_surface(
-            mesh.phase, torques, errors, unloaded, design_torque=float(optimum.cycle.torque), design=name
-        ),
-    }
-    if front is None:  # the compromise of a front is measured by the front so far, which moves
-        axes["convergence"] = plot.convergence({optimum.method: optimum})
-    if optimum.iterations:
-        axes["iterations_relief"] = plot.iterations_relief(mesh, optimum)
-        axes["iterations_transmission_error"] = plot.iterations_transmission_error(optimum, mesh.phase)
-    if front is not None:
-        axes["front"] = plot.optimum_front(front, chosen=front.chosen, others=others_of(front, evaluations))
-    return axes
-
-
-def _feasibility(optimum: Optimum) -> Iterator[tuple[str, str]]:
-    label = "limits"
-    for name, limit in optimum.constraints.items():
-        yield label, f"{name} {limit}"
-        label = ""
+def _feasibility(optimum: Optimum) -> Iterator[str]:
+    yield from (f"{name} {limit}" for name, limit in optimum.constraints.items())
     if not optimum.feasible:
         passed = f"the nearest design exceeds one by {100 * optimum.violation:.2g} %"
         alone = optimum.problem is not None and len(optimum.problem.objectives) == 1
         sought = ", also when it minimized their violation alone" if alone else ""
-        yield label, f"NOT FEASIBLE: the search found no design within all limits{sought}; {passed}"
+        yield f"NOT FEASIBLE: the search found no design within all limits{sought}; {passed}"
 
 
-def _bounds(file: DesignFile, optimum: Optimum) -> Iterator[tuple[str, str]]:
+def _bounds(file: DesignFile, optimum: Optimum) -> Iterator[str]:
     active = optimum.active_bounds
     if not optimum.parameters:
         return
-    label = "variables"
     if set(optimum.parameters) != set(file.bounds):
-        yield label, f"{len(optimum.parameters)} values of the flanks, {len(active)} of them at a bound"
+        yield f"{len(optimum.parameters)} values of the flanks, {len(active)} of them at a bound"
         return
     for name, side in list(active.items())[:_SHOWN_BOUNDS]:
         bound = file.bounds[name][side == "upper"]
-        yield label, f"{name} is at its {side} bound {bound:g} {file.units[name]}".rstrip()
-        label = ""
+        yield f"{name} is at its {side} bound {bound:g} {file.units[name]}".rstrip()
     if len(active) > _SHOWN_BOUNDS:
-        yield label, f"and {len(active) - _SHOWN_BOUNDS} more are at a bound"
+        yield f"and {len(active) - _SHOWN_BOUNDS} more are at a bound"
     if not active:
-        yield label, "no variable is at a bound"
+        yield "no variable is at a bound"
 
 
-def _positions(optimum: Optimum, evaluations: side_by_side.Evaluations, searched_at: int) -> Iterator[str]:
-    said = f"searched at {searched_at} positions, " if searched_at != optimum.positions else ""
-    change = f"the objective by {optimum.grid_change:+.2g} {optimum.objective_unit}".rstrip()
-    shown = {
-        name: evaluations[name]
-        for name in dict.fromkeys([next(iter(evaluations)), side_by_side.main_name(evaluations)])
-    }
-    first, *others = side_by_side.grid(shown, change * bool(np.isfinite(optimum.grid_change)))
-    yield said + first
-    yield from others
-
-
-def _with_unit(file: DesignFile, name: str) -> str:
+def _with_unit(file: DesignFile, name: str) -> UnitKey:
     unit = file.units.get(name, "")
-    return f"{name}_{unit}" if unit and not name.endswith(f"_{unit}") else name
+    return UnitKey(name.removesuffix(f"_{unit}") if unit else name, unit)
