@@ -122,7 +122,7 @@ def test_manufactured_helical_pairs_scatter():
     mesh, nominal = solved()
     gears = ManufacturedGears(Tolerance.from_class(mesh.pair, 6), 16, 1)
     found = jg.monte_carlo(mesh, TORQUE, gears)
-    assert found.converged_share == 1.0
+    assert found.failed == 0
     assert found.nominal_ppte == pytest.approx(float(jg.peak_to_peak(nominal.transmission_error)), rel=1e-6)
     assert found.mean > found.nominal_ppte and found.std > 0.1
     exact = jg.monte_carlo(mesh, TORQUE, ManufacturedGears(Tolerance(), 16, 1))

@@ -241,7 +241,7 @@ def test_data_that_cannot_be_meant_are_refused_by_column(change, says):
     [
         ({"prior": {}}, "prior must name at least one unknown"),
         ({"prior": {**PRIOR, "pinion": (8.0, 0.0)}}, "prior standard deviation of pinion"),
-        ({"prior": {**PRIOR, "crowning": (0.0, 3.0)}}, "nothing depends on crowning"),
+        ({"prior": {**PRIOR, "crowning": (0.0, 3.0)}}, 'nothing depends on "crowning"'),
         ({"prior": {**PRIOR, "offset": (0.0, 3.0)}}, "give offset = its standard deviation"),
         ({"noise": None}, "noise = None needs 12 repeated readings"),
         ({"steps": 0}, "steps = 0"),

@@ -15,7 +15,6 @@ from .variant import Parameters as Parameters
 from .variant import Variant as Variant
 from .variant import Variants as Variants
 from .variant import call_with as call_with
-from .variant import check_used as check_used
 from .variant import cycle_status as cycle_status
 from .variant import solve_case as solve_case
 from .variant import solved as solved

@@ -99,8 +99,12 @@ class Variants(Checked):
         parameters = dict(zip(self.names, map(real, values)))
         return eqx.filter_eval_shape(partial(call_with, "mesh", self.mesh), parameters)
 
-    def traced(self, values: Iterable) -> tuple[ClosedJaxpr, list[str]]:
-        """Jaxpr of all that the variables make, as an identity of the functions, and the variables that it uses."""
+    def traced(self, values: Iterable) -> ClosedJaxpr:
+        """Jaxpr of all that the variables make, as an identity of the functions.
+
+        Raises:
+            ValueError: for variables on which nothing depends.
+        """
 
         def made(values, mesh):
             whole = self if mesh is None else eqx.tree_at(lambda tree: tree.mesh, self, mesh)
@@ -115,7 +119,9 @@ class Variants(Checked):
         mesh = self.mesh if isinstance(self.mesh, Mesh) else None
         closed, _, _ = eqx.filter_make_jaxpr(made)(tuple(values), mesh)
         _, used = dce_jaxpr(closed.jaxpr, [True] * len(closed.jaxpr.outvars))
-        return closed, [name for name, is_used in zip(self.names, used) if is_used]
+        if unused := [f'"{name}"' for name, is_used in zip(self.names, used) if not is_used]:
+            raise ValueError(f"nothing depends on {', '.join(unused)}: use it in design, or leave it out")
+        return closed
 
 
 def variants(
@@ -183,13 +189,6 @@ def call_with(name: str, function: Callable[[Parameters], Result], parameters: P
             f"{name}: needs the value of a variable (by if, and, or, not, min, max, float or int), but variables are "
             "traced: use jax.numpy.where, minimum or maximum, and no other kind of modification"
         ) from error
-
-
-def check_used(names: Sequence[str], used: Sequence[str]) -> None:
-    """Raises a `ValueError` that names the variables on which nothing depends."""
-    unused = [f'"{name}"' for name in names if name not in used]
-    if unused:
-        raise ValueError(f"nothing depends on {', '.join(unused)}: use it in design, or leave it out")
 
 
 def two_modifications(made: object) -> tuple[AbstractModification, AbstractModification]:

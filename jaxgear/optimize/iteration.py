@@ -88,12 +88,6 @@ _STEEPEST = 2.0  # slant of a relief that begins a quarter of the way to the tip
 _HALVINGS = 5  # of the range of slants: the slant is the least one within 1/16
 
 
-class _Start(NamedTuple):
-    pinion: AbstractModification
-    wheel: AbstractModification
-    evaluations: int
-
-
 class Levelled(NamedTuple):
     """All states of an iteration.
 
@@ -305,12 +299,12 @@ class TransmissionErrorIteration(Checked, AbstractMethod):
         """
         began, mesh, torque = time.perf_counter(), problem.mesh, float(problem.cases.torque[0])
         self._check(problem, rounding)
-        first = self._first(problem, callback)
+        pinion, wheel, before = self._first(problem, callback)
         limit = None if self.max_pressure is None else Constraint("max_contact_pressure", high=self.max_pressure)
         spent: list[int] = []
 
         def end_on(finer: Mesh, between: bool = True) -> tuple[Levelled, bool]:
-            flanks = IteratedFlanks(mesh, *first[:2], self.max_relief)
+            flanks = IteratedFlanks(mesh, pinion, wheel, self.max_relief)
             pressure = Pressure(limit, torque, parts(finer, mesh.resolution.positions))
             found = levelled(mesh, flanks, pressure, self.rtol, self.steps, spent, callback)
             return found, between and pressure.holds_between(found, finer)
@@ -342,9 +336,9 @@ class TransmissionErrorIteration(Checked, AbstractMethod):
             active_bounds={},
             constraints=limits,
             violation=excess,
-            evaluations=first.evaluations + sum(spent),
+            evaluations=before + sum(spent),
             history=np.asarray(found.reached),
-            history_evaluations=first.evaluations + np.cumsum(spent)[-len(found.reached) :],
+            history_evaluations=before + np.cumsum(spent)[-len(found.reached) :],
             seconds=time.perf_counter() - began,
             iterations=tuple(found.iterates),
         )
@@ -360,12 +354,14 @@ class TransmissionErrorIteration(Checked, AbstractMethod):
         if self.start == "given" and problem.names:
             raise ValueError('start = "given" needs a design without variables')
 
-    def _first(self, problem: Problem, callback: Callback | None) -> _Start:
+    def _first(
+        self, problem: Problem, callback: Callback | None
+    ) -> tuple[AbstractModification, AbstractModification, int]:
         """The flanks of the first step, and the contact analyses that they took."""
         if self.start == "unmodified":
-            return _Start(NoModification(), NoModification(), 0)
+            return NoModification(), NoModification(), 0
         if self.start == "given":
-            return _Start(*problem.modifications(np.empty(0)), 0)
+            return *problem.modifications(np.empty(0)), 0
         posed = Problem(
             problem.mesh,
             problem.cases.first,
@@ -375,4 +371,4 @@ class TransmissionErrorIteration(Checked, AbstractMethod):
             constraints=(Constraint("max_relief", high=self.max_relief),),
         )
         found = self.search.find(posed, positions=None, rounding={}, callback=callback)
-        return _Start(found.pinion, found.wheel, found.evaluations)
+        return found.pinion, found.wheel, found.evaluations

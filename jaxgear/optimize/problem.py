@@ -18,7 +18,6 @@ from ..conditions import (
     Parameters,
     Variants,
     call_with,
-    check_used,
     conditions,
     cycle_status,
     solve_case,
@@ -161,8 +160,7 @@ class Problem(eqx.Module):
         self.constraints = tuple(
             limit if limit.quantity is None else changed(limit, quantity=next(of_limits)) for limit in constraints
         )
-        made = Variants(self.names, design, mesh, None, self.conditions, self.cases)
-        check_used(self.names, made.traced(np.asarray(self.low))[1])
+        Variants(self.names, design, mesh, None, self.conditions, self.cases).traced(np.asarray(self.low))
 
     def __str__(self) -> str:
         what = ", ".join(of.name for of in self.objectives)

@@ -36,11 +36,6 @@ class Iterate(Checked):
     max_flank_pressure: float
     max_corner_pressure: float
 
-    @property
-    def max_pressure(self) -> float:
-        """The larger of both [MPa]."""
-        return max(self.max_flank_pressure, self.max_corner_pressure)
-
 
 class Limit(Checked):
     """A constraint at the optimum.

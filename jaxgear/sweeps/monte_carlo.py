@@ -77,11 +77,6 @@ class Scatter(Checked):
         """Number of failed samples."""
         return int(np.sum(~np.asarray(self.converged)))
 
-    @property
-    def converged_share(self) -> float:
-        """Share of the samples that did not fail."""
-        return 1 - self.failed / self.converged.shape[0]
-
     def __str__(self) -> str:
         return "\n".join(
             [

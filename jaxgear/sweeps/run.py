@@ -13,7 +13,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from ..conditions import Conditions, Design, Parameters, Variants, check_used, label, variants
+from ..conditions import Conditions, Design, Parameters, Variants, label, variants
 from ..conditions.cases import Loads
 from ..conditions.join import side_by_side
 from ..contact import Mesh, solve
@@ -24,7 +24,7 @@ from ..numerics.durable import digest
 from ..tolerance import ManufacturedGears
 from ..version import version
 from ..vocabulary import quantities, quantity_of
-from .columns import CAUSE, FLAG, NUMBER, Column, parameter_columns
+from .columns import CAUSE, FLAG, NUMBER, parameter_columns
 from .evaluate import FEW, LEAST_STEPS, Evaluator
 from .plan import AbstractPlan
 from .store import MANIFEST, Manifest, Store, load_manifest
@@ -107,8 +107,7 @@ def sweep(
         raise TypeError(f"plan is a {kind}, must be FullFactorial, LatinHypercube, Sobol or VariantList")
     example = plan.rows(0, 1)[0]
     made = variants(mesh, torque, design, names=plan.names, values=example, manufactured=manufactured)
-    traced, used = made.traced(jnp.asarray(example))
-    check_used(plan.names, used)
+    traced = made.traced(jnp.asarray(example))
     wanted = [quantity_of(of) for of in results]
     joins = _measures(made.conditions, measures)
     few = plan.size * made.conditions.count <= FEW
@@ -116,7 +115,8 @@ def sweep(
         part_rows = _part_rows(made, example, plan.size, output)
     rows = min(part_rows, plan.size)
     evaluator = Evaluator(made, example, results=wanted, measures=joins, rows=rows, few=few)
-    columns = _columns(plan, units or {}, evaluator)
+    names = [column.name for column in evaluator.columns]
+    columns = [NUMBER, *parameter_columns(plan, units or {}, names), *evaluator.columns, FLAG, CAUSE]
     settings = {
         **_settings(made, example, _design_digest(traced), plan, wanted),
         "columns": [column.name for column in columns],
@@ -201,17 +201,6 @@ def _run(evaluator: Evaluator, plan: AbstractPlan, store: Store, parts: dict[int
 def _wait(there: Callable[[], bool]) -> None:
     while not there():
         time.sleep(_POLL)
-
-
-def _columns(plan: AbstractPlan, units: Mapping[str, str], evaluator: Evaluator) -> list[Column]:
-    names = [column.name for column in evaluator.columns]
-    return [
-        NUMBER,
-        *parameter_columns(plan, units, names),
-        *evaluator.columns,
-        FLAG,
-        CAUSE,
-    ]
 
 
 def _measures(conditions: Conditions, given: Sequence[AbstractMeasure] | None) -> tuple[AbstractMeasure, ...]:
