@@ -47,7 +47,7 @@ def run_study(
         command: the command line, where a report is written.
     """
     asked = document(command, file, *of.report_needs)
-    if not of.grows:
+    if options.get("quick") or not of.grows:
         compile_quickly()
     with Stages() as stages:
         design = opened(file, cache=cache)
