@@ -62,9 +62,7 @@ Curve = Float[Array, " positions"]
 _SECANT_STEPS = 2
 # Iterations for the load of a spring on its own at a prescribed approach.
 _OWN_STEPS = 3
-# Newton steps with secants that follow the logarithm of the load: from where they lead, one step with the laws is down
-# to the rounding of single precision, as a rule, at a third of the cost of another one with the laws.
-_LOGARITHM_STEPS = 2
+_LAW_STEPS = 2
 # Steps with the laws where slices are coupled: their active sets settle later, and of 400 random gaps that arch
 # over the slices 45 % still need a second step in double precision after one of these, 0.5 % after two.
 _LAW_STEPS_COUPLED = 2
@@ -129,28 +127,24 @@ def _solve(steps: int, tolerance: float, problem: ContactProblem, common: Curve)
 
 
 def _near(problem: ContactProblem) -> tuple[Rows, Curve]:
-    """Iterate and approach near the solution, by evaluations of the laws at its end alone."""
+    """Iterate and approach near the solution, by steps in the precision of the problem."""
     shared = problem if problem.start_law is None else replace(problem, law=problem.start_law)
-    v, start, secant = _start(shared)
-    start = [jnp.maximum(q, LOAD_FLOOR) for q in start]
-    rate = [jnp.clip(k - c, -_STEEPEST * c, _STEEPEST * c) for k, c in zip(slopes_under(shared, start, secant), secant)]
+    v, secant = _start(shared)
 
-    def with_logarithms(i, state):  # one loop for both kinds of secants: the elimination is most of it
-        follows = jnp.where(i < _SECANT_STEPS, 0.0, 1.0)
-        grown = [jnp.log(jnp.clip(q / q0, _LEAST, _MOST)) for q, q0 in zip(carried_by(state[0]), start)]
-        followed = [c + follows * k * x for c, k, x in zip(secant, rate, grown)]
-        return _newton(problem, state[0], followed, [c + follows * k for c, k in zip(followed, rate)])
-
-    def with_laws(_, state):
+    def advance(i, state):
         load = carried_by(state[0])
         exact = secants_under(problem, load)
-        return _newton(problem, state[0], exact, slopes_under(problem, load, exact))
+        slope = slopes_under(problem, load, exact)
+        first = i < _SECANT_STEPS
+        return _newton(
+            problem,
+            state[0],
+            [jnp.where(first, c, each) for c, each in zip(secant, exact)],
+            [jnp.where(first, c, each) for c, each in zip(secant, slope)],
+        )
 
-    state = v, jnp.zeros_like(problem.gap[0, 0])
-    state = jax.lax.fori_loop(0, _SECANT_STEPS + _LOGARITHM_STEPS, with_logarithms, state)
-    return (
-        with_laws(0, state) if problem.coupling is None else jax.lax.fori_loop(0, _LAW_STEPS_COUPLED, with_laws, state)
-    )
+    steps = _SECANT_STEPS + (_LAW_STEPS if problem.coupling is None else _LAW_STEPS_COUPLED)
+    return jax.lax.fori_loop(0, steps, advance, (v, jnp.zeros_like(problem.gap[0, 0])))
 
 
 def _iterate(
@@ -217,8 +211,8 @@ def _solve_jvp(steps, tolerance, primals, tangents):
     return (v, approach, residual), (v_dot, approach_dot, jnp.zeros_like(residual))
 
 
-def _start(problem: ContactProblem) -> tuple[Rows, Slopes, Slopes]:
-    """Equal loads on every spring that can be in contact at all, these loads, and the secants under them.
+def _start(problem: ContactProblem) -> tuple[Rows, Slopes]:
+    """Equal loads on every spring that can be in contact at all, and the secants under them.
 
     The secants do not depend on the gaps: for many problems that differ in their gaps alone they are evaluated once.
     """
@@ -233,18 +227,18 @@ def _start(problem: ContactProblem) -> tuple[Rows, Slopes, Slopes]:
         for gap, c, own, lever, load in zip(problem.gap, secant, problem.own_compliance, problem.levers, loads)
     ]
     bound = jnp.min(jnp.stack(alone), axis=0)
-    return [lever * bound[None] - gap for lever, gap in zip(problem.levers, problem.gap)], loads, secant
+    return [lever * bound[None] - gap for lever, gap in zip(problem.levers, problem.gap)], secant
 
 
-def _start_at(problem: ContactProblem) -> tuple[Rows, Slopes, Slopes]:
-    """Contact wherever the approach closes the gap, the loads of every spring on its own, and their secants."""
+def _start_at(problem: ContactProblem) -> tuple[Rows, Slopes]:
+    """Contact wherever the approach closes the gap, and the secants under the loads of every spring on its own."""
     assert problem.approach is not None
     closed = [lever * problem.approach[None] - gap for lever, gap in zip(problem.levers, problem.gap)]
     load = [jnp.ones_like(row) for row in closed]
     for _ in range(_OWN_STEPS):
         secant = secants_under(problem, load)
         load = [row / (c + own) for row, c, own in zip(closed, secant, problem.own_compliance)]
-    return closed, load, secants_under(problem, load)
+    return closed, secants_under(problem, load)
 
 
 def _newton(problem: ContactProblem, v: Rows, secant: Slopes, slope: Slopes) -> tuple[Rows, Curve]:
