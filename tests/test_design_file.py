@@ -984,7 +984,8 @@ def test_a_result_folder_is_complete_or_absent(tmp_path):
         (folder / "summary.json").write_text("half")
         raise KeyboardInterrupt
     assert list(tmp_path.iterdir()) == []
-    first, second = (json.dumps({"versions": {"jaxgear": version}}) for version in ("1", "2"))
+    held = {"contents": ["summary.json"]}
+    first, second = (json.dumps({"versions": {"jaxgear": version}, **held}) for version in ("1", "2"))
     for content in (first, second):
         with result_folder(target) as folder:
             (folder / "summary.json").write_text(content)

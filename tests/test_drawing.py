@@ -101,7 +101,8 @@ def test_a_chamfer_ends_the_flank_and_leaves_the_tip():
     assert float(paths[0].contact_ratio - paths[1].contact_ratio) == pytest.approx(float(lost), rel=1e-12)
     assert float(paths[0].start) == float(paths[1].start)
     clearances = [float(jg.margins(pair).pinion_tip_clearance) for pair in pairs]
-    assert clearances[0] == clearances[1], "the chamfered tip reaches as deep into the space"
+    # as deep into the space; up to rounding, since a form circle makes another program
+    assert clearances[0] == pytest.approx(clearances[1], abs=1e-12)
 
 
 def test_chamfers_that_meet_leave_no_tip():

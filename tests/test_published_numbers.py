@@ -169,13 +169,14 @@ def stacked(trees: Any) -> Any:
 
 def known(case: Published) -> Known:
     pair, both = jg.GearPair(*case.gears, case.center_distance), stacked(case.gears)
+    path = path_of_contact(pair)
     return Known(
         case=case,
         pair=pair,
         both=both,
-        path=path_of_contact(pair),
-        contact=contact_factor_squares(pair),
-        root=stacked(single_contact_factors(pair)),
+        path=path,
+        contact=contact_factor_squares(pair, path),
+        root=stacked(single_contact_factors(pair, path)),
         section=jax.vmap(critical_section)(both),
         stiffness=jg.sizing.iso_stiffness(pair),
         measures=jax.vmap(measures)(both, jnp.asarray(case.spanned), jnp.asarray(case.balls)),

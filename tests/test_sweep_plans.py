@@ -108,7 +108,7 @@ def test_descriptions_tell_plans_apart():
 @pytest.mark.parametrize(
     "make, problem",
     [
-        (lambda: jg.Sobol({}, 8, seed=0), "Sobol: bounds must name at least one parameter"),
+        (lambda: jg.Sobol({}, 8, seed=0), "bounds must name at least one parameter"),
         (lambda: jg.Sobol({"a": (1.0, 1.0)}, 8, seed=0), "upper bound of a = 1 must be greater than 1"),
         (lambda: jg.Sobol(BOUNDS, 2**30 + 1, seed=0), "samples = 1073741825 must be at most"),
         (lambda: jg.LatinHypercube(BOUNDS, 0, seed=0), "samples = 0 must be a whole number"),

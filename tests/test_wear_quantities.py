@@ -137,7 +137,7 @@ def test_a_name_without_settings_says_what_it_needs(mesh):
         (lambda: Wear(1e7, -1e-18), "Wear: coefficient = -1e-18 m2/N must be at least 0 m2/N"),
         (lambda: Wear(1e7, 1e-12), "Wear: coefficient = 1e-12 m2/N must be at least 0 m2/N and at most 1e-13 m2/N"),
         (lambda: Wear(1e7, 1e-18, -1.0), "Wear: wheel_coefficient = -1 m2/N must be at least 0 m2/N"),
-        (lambda: Wear(1e7, 1e-18, blocks=5), "Wear: blocks = 5 must be even"),
+        (lambda: Wear(1e7, 1e-18, blocks=5), "blocks = 5 must be even"),
         (lambda: Wear(1e7, 1e-18, points=2), "Wear: points = 2 must be a whole number of at least 3"),
         (lambda: Wear(1e7, 1e-18, depth_limit=0.0), "Wear: depth_limit = 0 um must be greater than 0 um"),
         (lambda: Wear(1e7, 1e-18, ppte_limit=0.0), "Wear: ppte_limit = 0 um must be greater than 0 um"),

@@ -14,7 +14,8 @@ from ..compliance import AbstractCompliance, default_compliance
 from ..compliance.hertz import ContactGeometry, contact_geometry
 from ..compliance.plane import Plane, contact_plane
 from ..compliance.tooth import ToothLoad, tooth_load
-from ..geometry import GearPair, Margins, Outline, PairGeometry, PathOfContact, explicit, pair_geometry
+from ..geometry import GearPair, Margins, Outline, PathOfContact, explicit, pair_geometry
+from ..geometry.pair import PairGeometry
 from ..microgeometry import Flank
 from ..numerics import AbstractSpring, Given, SliceCoupling, changed, on_both, over_slices, program
 from ..numerics.programs import begin

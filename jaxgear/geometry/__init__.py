@@ -26,7 +26,6 @@ from .material import Material as Material
 from .outline import Outline as Outline
 from .outline import outline as outline
 from .pair import GearPair as GearPair
-from .pair import PairGeometry as PairGeometry
 from .pair import explain as explain
 from .pair import explicit as explicit
 from .pair import is_even as is_even

@@ -365,5 +365,5 @@ def _rounded(measured: Limits, allowance_of: Callable[..., Limits], largest: Cal
     known = concrete(allowance)
     if known is not None and known.max() > _ROUNDED:
         most = f"{float(largest()):.7g} mm, as the rack makes the tooth"
-        raise ValueError(f"ToothThickness: {float(jnp.max(measured)):.7g} mm must be at most {most}")
+        raise ValueError(f"{float(jnp.max(measured)):.7g} mm must be at most {most}")
     return jnp.where(allowance <= _ROUNDED, jnp.minimum(allowance, 0.0), allowance)

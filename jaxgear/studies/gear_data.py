@@ -8,8 +8,9 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from ..geometry import Gear, GearPair, Outline, PairGeometry, PathOfContact, diameter, explicit, pair_geometry
+from ..geometry import Gear, GearPair, Outline, PathOfContact, diameter, explicit, pair_geometry
 from ..geometry.gear import has_full_radius, tool_name
+from ..geometry.pair import PairGeometry
 from ..io import DesignFile
 from ..io.tolerance_table import quality_classes
 from ..manufacture import measures

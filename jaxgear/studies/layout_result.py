@@ -373,11 +373,11 @@ def _layout(layout: FlankLineLayout) -> dict[str, Any]:
             for name, one in of.items()
         }
 
-    life = {
-        hours: [one.life for one in layout.damage],
-        "relative_life": layout.relative_life,
-        "worst_relative_life": {name: layout.worst_relative_life(name) for name in layout.lives},
-    }
+    life: dict[str, Any] = {}
+    if layout.damage:  # there is a duty cycle
+        life[hours] = [one.life for one in layout.damage]
+        life["relative_life"] = layout.relative_life
+        life["worst_relative_life"] = {name: layout.worst_relative_life(name) for name in layout.lives}
     factors = np.asarray(layout.factors)
     return {
         UnitKey("torque", "N m"): layout.torque,
@@ -391,7 +391,7 @@ def _layout(layout: FlankLineLayout) -> dict[str, Any]:
         "root_face_load_factor": dict(zip(("unmodified", "step_1"), root_factor(layout, factors))),
         "cases": CASES,
         **_by_step({f"{step} cases": cases(of, number) for number, (step, of) in enumerate(zip(STEPS, layout.cases))}),
-        **(life if layout.damage else {}),
+        **life,
     }
 
 
