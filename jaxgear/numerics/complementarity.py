@@ -57,18 +57,11 @@ Rows = list[Float[Array, "slices positions"]]
 Slopes = list[Float[Array, "#slices positions"]]  # one row where a secant is the same in every slice
 Curve = Float[Array, " positions"]
 
-# Steps with the secants of the springs under the loads of the start: they find most of the active set at a tenth of the
-# cost.
-_SECANT_STEPS = 2
 # Iterations for the load of a spring on its own at a prescribed approach.
 _OWN_STEPS = 3
-_LAW_STEPS = 2
-# Steps with the laws where slices are coupled: their active sets settle later, and of 400 random gaps that arch
-# over the slices 45 % still need a second step in double precision after one of these, 0.5 % after two.
-_LAW_STEPS_COUPLED = 2
-# A secant follows the logarithm between these multiples of the load at the start, and changes per logarithm by this
-# share of itself at most: slopes stay positive.
-_LEAST, _MOST, _STEEPEST = 1e-3, 5.0, 0.3
+# Newton steps in single precision before those in the precision of the problem. The first one, with the secants under
+# the loads of the start, finds most of the active set; of two more most positions are within single precision.
+_NEAR_STEPS = 3
 # Residual of a solution where the caller does not choose. In double precision that is a tenth of a femtometre on an
 # approach of 10 um.
 _TOLERANCE = {jnp.dtype(jnp.float32): 5e-6, jnp.dtype(jnp.float64): 1e-11}
@@ -127,24 +120,21 @@ def _solve(steps: int, tolerance: float, problem: ContactProblem, common: Curve)
 
 
 def _near(problem: ContactProblem) -> tuple[Rows, Curve]:
-    """Iterate and approach near the solution, by steps in the precision of the problem."""
+    """Iterate and approach near the solution, by Newton steps in the precision of the problem.
+
+    One loop holds the laws of the springs once, though its first step takes the secants of the start.
+    """
     shared = problem if problem.start_law is None else replace(problem, law=problem.start_law)
     v, secant = _start(shared)
 
-    def advance(i, state):
+    def advance(number, state):
         load = carried_by(state[0])
-        exact = secants_under(problem, load)
+        known, exact = number == 0, secants_under(problem, load)
         slope = slopes_under(problem, load, exact)
-        first = i < _SECANT_STEPS
-        return _newton(
-            problem,
-            state[0],
-            [jnp.where(first, c, each) for c, each in zip(secant, exact)],
-            [jnp.where(first, c, each) for c, each in zip(secant, slope)],
-        )
+        chosen = [[jnp.where(known, c, each) for c, each in zip(secant, of)] for of in (exact, slope)]
+        return _newton(problem, state[0], *chosen)
 
-    steps = _SECANT_STEPS + (_LAW_STEPS if problem.coupling is None else _LAW_STEPS_COUPLED)
-    return jax.lax.fori_loop(0, steps, advance, (v, jnp.zeros_like(problem.gap[0, 0])))
+    return jax.lax.fori_loop(0, _NEAR_STEPS, advance, (v, jnp.zeros_like(problem.gap[0, 0])))
 
 
 def _iterate(
