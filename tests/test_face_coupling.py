@@ -387,7 +387,7 @@ def test_shafts_of_a_gearbox_hold_at_its_torque():
         jg.solve(prepared, 80.0)
     with pytest.raises(ValueError, match="torque = 80 N m"):
         jg.contact.solve_at(prepared, 5.0, torque=80.0)
-    with pytest.raises(ValueError, match="load: torque = 80 N m"):
+    with pytest.raises(ValueError, match="torque = 80 N m"):
         jg.minimize(jg.Problem(prepared, 80.0, lambda x: (jg.TipRelief(x["a"], 3.0), None), {"a": (0.0, 9.0)}))
     both = jax.vmap(lambda torque: jg.solve(prepared, torque).status)(jnp.stack([held.torque, 0.9 * held.torque]))
     assert not bool(both[0].any()) and bool((both[1] == Status.OUT_OF_VALIDITY).all())

@@ -314,8 +314,8 @@ def of_the_pair(beta):
     return jnp.stack(
         [
             *contact_line_lengths(pair),
-            *metrics.stress.nominal_stress_squares(pair),
-            *metrics.stress.single_contact_root_stress(pair),
+            *metrics.stress.nominal_stress_squares(pair, path_of_contact(pair)),
+            *metrics.stress.single_contact_root_stress(pair, path_of_contact(pair)),
             metrics.ohlendorf_loss_factor(pair),
             iso_stiffness(pair, 50.0).mesh,
             sizing.relief_amount(pair, TORQUE),
