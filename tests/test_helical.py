@@ -113,7 +113,7 @@ def test_a_small_angle_goes_to_the_spur_gear():
 def test_the_other_hand_is_the_mirrored_face():
     _, right = solved(15.0, 20.0)
     _, left = solved(-15.0, -20.0)
-    np.testing.assert_allclose(left.transmission_error, right.transmission_error, rtol=1e-12)
+    np.testing.assert_allclose(left.transmission_error, right.transmission_error, rtol=2e-11)  # each is solved to 1e-11
     np.testing.assert_allclose(left.line_load[:, ::-1], right.line_load, atol=1e-9)
 
 

@@ -57,7 +57,7 @@ def test_slopes_of_the_transmission_error(mesh):
     Nonlinear compliance, coupled tooth pairs and corner contact are all in it.
     """
     tolerance = jg.Tolerance(pinion=GearTolerance(profile_slope=5.0, pitch=4.0))
-    problem = problem_of(mesh, tolerance=tolerance, samples=2, seed=1)
+    problem = problem_of(mesh, manufactured=jg.ManufacturedGears(tolerance, 2, 1))
     found = linearize(problem, jnp.asarray(POINT))
     assert bool(found.fine)
     (pieces,) = found.objectives

@@ -333,16 +333,16 @@ def test_manufactured_gears(known, best):
     """Every design meets the same gears: a repetition gives the same numbers, and the nominal optimum can be beaten."""
     tolerance = jg.Tolerance(pinion=GearTolerance(profile_slope=6.0, pitch=4.0), wheel=GearTolerance(profile_slope=6.0))
     measure = jg.CVaR(0.75)
-    made = {"tolerance": tolerance, "samples": 8, "seed": 3}
+    made = jg.ManufacturedGears(tolerance, samples=8, seed=3)
 
     def search():
-        return known.minimize(known.parabolas, TALL, measure=measure, **made)
+        return known.minimize(known.parabolas, TALL, measure=measure, manufactured=made)
 
     result, again = search(), search()
     assert result.parameters == again.parameters and result.objective == again.objective
     assert result.objective_name == "75 % CVaR of ppte"
 
-    removed = conditions("test", known.mesh, known.torque, **made).on(known.mesh).removed[0]
+    removed = conditions(known.mesh, known.torque, made).on(known.mesh).removed[0]
     assert removed.shape[0] == 8
 
     def tail(found):

@@ -137,9 +137,10 @@ def test_a_load_spectrum_gives_mean_worst_and_every_torque(mesh, spectrum_table)
 @pytest.mark.slow
 def test_a_tolerance_gives_mean_and_quantile_over_common_deviations(mesh):
     tolerance = jg.Tolerance.from_class(mesh.pair, 6).without_lead()
-    table = run(mesh, tolerance=tolerance, samples=4, seed=9, results=("ppte", "effective_contact_ratio"))
+    made = jg.ManufacturedGears(tolerance, 4, 9)
+    table = run(mesh, manufactured=made, results=("ppte", "effective_contact_ratio"))
     assert table.results[:2] == ("ppte_um_mean", "ppte_um_q95")
-    deviations = jg.ManufacturedGears(tolerance, 4, 9).on(mesh)
+    deviations = made.on(mesh)
     pinion, wheel = design(dict(zip(BOUNDS, PLAN.rows(7, 8)[0])))
 
     @eqx.filter_jit

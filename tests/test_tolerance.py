@@ -406,7 +406,7 @@ pair = jg.GearPair(*gears)
 mesh = jg.prepare(pair, resolution=jg.Resolution(positions=16, pairs=2, slide_steps=0))
 tolerance = jg.Tolerance.from_class(pair, 5).without_lead()
 relief = {"pinion": jg.TipRelief(7.0, 4.0), "wheel": jg.TipRelief(6.0, 4.0)}
-scatter = jg.monte_carlo(mesh, 50.0, tolerance=tolerance, samples=20, seed=1, **relief)
+scatter = jg.monte_carlo(mesh, 50.0, jg.ManufacturedGears(tolerance, 20, 1), **relief)
 print(len(jax.devices()), *(float(value) for value in scatter.ppte))
 """
     cache = {"JAX_COMPILATION_CACHE_DIR": str(jax.config.jax_compilation_cache_dir or "")}
