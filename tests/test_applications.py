@@ -13,7 +13,7 @@ import jaxgear
 
 PACKAGE = Path(jaxgear.__file__).parent
 # folders of the package that no other one imports
-APPLICATIONS = ("dimensionless", "identification", "rexs")
+APPLICATIONS = ("dimensionless", "identification", "rating", "rexs")
 # imports every module, shows the help and analyzes a pair
 REST = """
 import pathlib, pkgutil, sys, importlib

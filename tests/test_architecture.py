@@ -42,6 +42,7 @@ ORDER = (
     "report",
     "studies",
     "cli",
+    "rating",
     "identification",
     "rexs",
 )
