@@ -5,6 +5,7 @@ import importlib
 import json
 from types import SimpleNamespace
 
+import equinox as eqx
 import numpy as np
 import pytest
 from commands import FACE, LINE, call
@@ -444,11 +445,15 @@ def test_an_analysis_says_what_it_leaves_out(file, tmp_path):
     assert line[1:] in report and "Shafts, bearings and housing are those of the design file" not in report
 
 
+def test_shafts_carry_the_gears_without_a_layout(file):
+    """Turning as with the default direction of [layout]."""
+    alone, with_layout = (load_design(file(content)).support for content in (FILE[: FILE.index("[layout]")], FILE))
+    assert eqx.tree_equal(alone, with_layout)
+    clockwise = load_design(file(replaced("[layout]", '[layout]\ndirection = "clockwise"'))).support
+    assert clockwise.gearbox.direction != alone.gearbox.direction
+
+
 WRONG = [
-    (
-        FILE[: FILE.index("[layout]")],
-        "shafts: has no effect without [layout]",
-    ),
     (FILE[: FILE.index("[housing]")] + "[layout]\nquality_class = 6\n", "layout: has no effect without [[shafts]]"),
     (replaced("quality_class = 6\n", ""), "layout.quality_class: missing, this key is required"),
     (replaced("quality_class = 6", "quality_class = 14"), "layout.quality_class: 14 must be at least 1 and at most 11"),

@@ -103,7 +103,10 @@ def package(tmp_path, monkeypatch):
     (tmp_path / "site" / "shares_of_torque.py").write_text(SOURCE)
     monkeypatch.syspath_prepend(tmp_path / "site")
     entry = importlib.metadata.EntryPoint("share", "shares_of_torque:ShareStudy", "jaxgear.studies")
-    monkeypatch.setattr(importlib.metadata, "entry_points", lambda *, group: [entry] * (group == entry.group))
+    known = importlib.metadata.entry_points
+    monkeypatch.setattr(
+        importlib.metadata, "entry_points", lambda *, group: [*known(group=group), *[entry] * (group == entry.group)]
+    )
     yield lambda: importlib.import_module("shares_of_torque")
     sys.modules.pop("shares_of_torque", None)
 

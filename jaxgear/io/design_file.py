@@ -23,7 +23,7 @@ from ..microgeometry import AbstractModification
 from ..numerics import program
 from ..shafts import AbstractSupport, Misalignment, RigidSupport, ShaftSupport
 from . import gearbox
-from .errors import DesignFileError, naming, printable, refused
+from .errors import DesignFileError, join, naming, printable, refused
 from .flanks import check_files
 from .gears import (
     GearSection,
@@ -62,9 +62,7 @@ _MOST_DEFLECTION = 250.0
 _TORQUE_RANGE = (0.5, 2.0)
 
 
-# Tables that know the drive flanks alone: the line of action of their force, or the order in which positions follow.
-_OF_DRIVE_FLANKS = "dynamics", "layout", "misalignment", "teeth", "wear"
-_CLASSIFIED = "layout", "tolerance"  # tables with flank tolerance classes
+_TURNING = "shafts", "counterclockwise"  # of the first shaft where no table says its direction
 _ONLY_DRIVE = "which {} does not know: give a positive torque"
 
 
@@ -414,11 +412,12 @@ def _only(names: set[str], of: Mapping[str, T]) -> dict[str, T]:
     return {name: value for name, value in of.items() if name in names}
 
 
-def _check_coast(says: Mapping[str, Any], torque: float) -> None:
+def _check_coast(says: Mapping[str, Any], further: Mapping[str, type[FurtherTable]], torque: float) -> None:
     """Raises a `DesignFileError` for tables that know the drive flanks alone."""
-    for name in _OF_DRIVE_FLANKS:
+    tables = {name: f"[{name}]" for name, cls in further.items() if cls.drive_only}
+    for name, shown in sorted({**tables, "misalignment": "[misalignment]", "shafts": "[[shafts]]"}.items()):
         if name in says:
-            problem = f"{torque:g} N m is carried by the coast flanks, {_ONLY_DRIVE.format(f'[{name}]')}"
+            problem = f"{torque:g} N m is carried by the coast flanks, {_ONLY_DRIVE.format(shown)}"
             raise DesignFileError("load.torque", problem)
 
 
@@ -430,7 +429,7 @@ def _read(file: Path, says: dict[str, Any]) -> tuple[DesignFile, list[FurtherTab
         increasing("load.torque_range[1]", load.torque_range[0], load.torque_range[1], unit=" N m")
     coast = False
     if not isinstance(load.torque, Free) and load.torque < 0:
-        _check_coast(says, load.torque)
+        _check_coast(says, further, load.torque)
         load, coast = load.changed(torque=-load.torque), True
     materials = materials_of(top.materials)
     gears = {"pinion": top.pinion, "wheel": top.wheel}
@@ -462,22 +461,20 @@ def _read(file: Path, says: dict[str, Any]) -> tuple[DesignFile, list[FurtherTab
         axes = replace(axes, fields={})
     torque, quality = float(usual.torque), quality_of(top.pinion, top.wheel)
     sections = {name: cls.read(says[name], folder) for name, cls in further.items() if name in says}
-    sections |= {name: with_quality(sections[name], quality) for name in _CLASSIFIED if name in sections}
+    sections |= {name: with_quality(section, quality) for name, section in sections.items() if section.classified}
     tables: dict[str, Any] = {name: section.held for name, section in sections.items()}
-    layout, support = tables.get("layout"), None
-    if layout is None:
-        top.refuse(["shafts", "meshes", "housing"], " without [layout]")
-    else:
+    uneven += [name for section in sections.values() for name in section.varies_along_face()]
+    support = None
+    if top.shafts:
         if axes.fields:
-            raise DesignFileError("misalignment", "has no effect with [layout], which takes that of [[meshes]]")
-        if layout.profile is not None:
-            uneven.append("the flank lines of layout.profile")
-        if not top.shafts:
-            raise DesignFileError("layout", "has no effect without [[shafts]]")
+            raise DesignFileError("misalignment", "has no effect with [[shafts]], which take that of [[meshes]]")
+        turning = [(join(table.key, "direction"), table.direction) for table in sections.values() if table.direction]
         options: dict[str, Any] = {"torque": torque, "folder": folder, "materials": materials}
         shafts = usual_pair, top.shafts, top.meshes, top.housing
-        support = gearbox.support_of(*shafts, direction=layout.direction, **options)
-    sizes = resolution_of(top.resolution, uneven, bent=layout is not None and len(top.meshes) < 2, longest=longest)
+        support = gearbox.support_of(*shafts, direction=next(iter(turning), _TURNING), **options)
+    else:
+        top.refuse(["meshes", "housing"], " without [[shafts]]")
+    sizes = resolution_of(top.resolution, uneven, bent=support is not None and len(top.meshes) < 2, longest=longest)
     model = with_tables(model, top.model, folder, pair, usual_pair)  # last, as it takes longer than all the rest
     mesh = FileMesh(pair, model, axes, sizes, coast)
     classes = tables["tolerance"].quality_class if "tolerance" in tables else quality

@@ -27,6 +27,7 @@ class DynamicsSection(FurtherTable, section_of(Dynamics, ("mesh_frequencies",), 
     """
 
     table = "dynamics"
+    drive_only = True
 
     mesh_frequencies: list[float] | None = entry(list_of(positive("Hz"), length=2))
     speeds: list[float] | None = entry(list_of(positive("rpm"), length=2))

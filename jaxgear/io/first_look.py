@@ -10,6 +10,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+from ..provided import provided
 from .errors import DesignFileError, join, naming
 from .toml import read
 from .trade_words import unknown_key
@@ -30,9 +31,12 @@ def check_keys(path: Path) -> None:
     with naming(path):
         says = read(path)
         for key, table, kind in _tables(says):
-            unknown = next((name for name in table if name not in known.get(kind, table)), None)
-            if unknown is not None:
-                raise DesignFileError(join(key, unknown), unknown_key(unknown, known[kind]))
+            unknown = [name for name in table if name not in known.get(kind, table)]
+            if unknown and not key:
+                known[key] |= {*provided("tables")}
+                unknown = [name for name in unknown if name not in known[key]]
+            if unknown:
+                raise DesignFileError(join(key, unknown[0]), unknown_key(unknown[0], known[kind]))
 
 
 def known_methods() -> list[str]:

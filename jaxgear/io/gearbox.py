@@ -161,7 +161,7 @@ def support_of(
     meshes: Sequence[MeshSection],
     housing: HousingSection | None,
     *,
-    direction: str,
+    direction: tuple[str, str],
     torque: float,
     folder: Path,
     materials: Materials,
@@ -171,7 +171,7 @@ def support_of(
     Args:
         pair: of the file.
         shafts, meshes, housing: the tables of these names.
-        direction: in which the first shaft turns.
+        direction: sense of rotation of the first shaft, seen against z, after the key that gives it.
         torque: of the file, on the pinion [N m].
         folder: of the design file.
         materials: of the file.
@@ -180,6 +180,7 @@ def support_of(
         DesignFileError: for tables that do not make a gearbox with pinion and wheel in it, or whose couplings bring
             another torque to the pinion.
     """
+    turning, sense = direction
     _check_names(shafts)
     made = [_shaft(each, pair, materials) for each in shafts]
     names = [gear.name for shaft in made for gear in shaft.gears]
@@ -191,10 +192,10 @@ def support_of(
     own = [index for index, mesh in enumerate(given) if (mesh.pinion, mesh.wheel) == _OWN]
     if not own:
         raise DesignFileError("meshes", 'missing, one must have pinion = "pinion" and wheel = "wheel"')
-    box = refused("meshes" if meshes else "shafts", Gearbox, made, given, None, direction)
+    box = refused("meshes" if meshes else "shafts", Gearbox, made, given, None, sense)
     if not pair.is_spur and box.turning(box.place(_OWN[0])[0]) < 0:
         problem = "makes the helical pinion turn clockwise, must be counterclockwise, seen against z, as of every pair"
-        raise DesignFileError("layout.direction", f"{problem}: count positions on shafts from the other end")
+        raise DesignFileError(turning, f"{problem}: count positions on shafts from the other end")
     brought = float(box.pinion_torques()[own[0]])
     if not np.isclose(brought, torque, rtol=_SAME_TORQUE):
         raise DesignFileError("load.torque", f"{torque:g} N m must be {brought:g} N m, that of the couplings")

@@ -101,6 +101,7 @@ class LayoutSection(FurtherTable):
     """
 
     table = "layout"
+    drive_only = classified = True
 
     quality_class: int | list[int] | None = entry(QUALITY_CLASSES)
     misalignment: str | Part | None = entry(_AXES)
@@ -124,11 +125,17 @@ class LayoutSection(FurtherTable):
         return super().read(given, folder)
 
     def check(self, design: DesignFile) -> None:
-        """Refuses axes, a duty cycle or profile modifications that do not go together."""
+        """Refuses axes, a duty cycle or profile modifications that do not go together, and gears without shafts."""
+        if design.support is None:
+            raise DesignFileError("layout", "has no effect without [[shafts]]")
         _axes(self.misalignment, float(design.pair().face_width))
         self.duty_cycle(design)
         if self.profile is not None:
             self.profile.variants()
+
+    def varies_along_face(self) -> list[str]:
+        """The flank lines of the gears that step 3 puts profile modifications on."""
+        return [] if self.profile is None else ["the flank lines of layout.profile"]
 
     def tolerances(self, design: DesignFile) -> dict[str, FlankLineTolerance]:
         """Tolerances of the flank lines by the kind of their sum."""

@@ -1,8 +1,8 @@
 """The tables of a design file: those of every file, and further ones, each by a class that says its name.
 
 A class with the attribute `table = "name"` is the table [name], and is known to design files without being listed: one
-derived from `FurtherTable`, or a class of settings derived from `Checked`, of the library or of a user's own module.
-`DesignFile.tables["name"]` is then an object of it.
+derived from `FurtherTable`, or a class of settings derived from `Checked`, of the library, of a user's own module, or
+of an application (see `jaxgear.provided`). `DesignFile.tables["name"]` is then an object of it.
 """
 
 import functools
@@ -10,11 +10,12 @@ import inspect
 import sys
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 from ..contact import OperatingPoint
 from ..metrics import Quantity
 from ..numerics import Checked, Number
+from ..provided import provided
 from .errors import DesignFileError, join, referring
 from .table_keys import FileTable, decode, descendants, entry, part_of, section_of
 from .template import Free
@@ -53,7 +54,17 @@ class LoadSection(section_of(OperatingPoint)):  # type: ignore[misc]
 
 
 class FurtherTable(FileTable):
-    """A table that a file may have besides those of gears, load and model."""
+    """A table that a file may have besides those of gears, load and model.
+
+    Attributes:
+        drive_only: True if the table knows the drive flanks alone; a file with a negative torque is refused then.
+        classified: True if its `quality_class` is that of the gears where these have one, and required elsewhere.
+        direction: sense of rotation of the first shaft, where the table has such a key.
+    """
+
+    drive_only: ClassVar[bool] = False
+    classified: ClassVar[bool] = False
+    direction: str | None = None
 
     @classmethod
     def read(cls, given: Mapping[str, Any], folder: Path) -> Self:
@@ -75,6 +86,10 @@ class FurtherTable(FileTable):
 
     def check(self, design: Any) -> None:
         """Raises a `DesignFileError` where the table does not go together with the rest of a design file."""
+
+    def varies_along_face(self) -> list[str]:
+        """Names of what makes the load vary along the face, which needs several slices; by default nothing."""
+        return []
 
     def quantity(self, design: Any, key: str, quantity: Quantity) -> Quantity:
         """A quantity of the settings that the table stands for, with them.
@@ -136,7 +151,7 @@ def further_tables(*, users: bool = True) -> dict[str, type[FurtherTable]]:
     Args:
         users: with those that are defined outside the library.
     """
-    _import_public()
+    _import_tables()
     found = [cls for base in (Checked, FurtherTable) for cls in descendants(base) if _names_a_table(cls)]
     library = {cls.table: cls for cls in found if cls.__module__.startswith("jaxgear.")}
     own = {cls.table: cls for cls in found if users and cls.table not in library}
@@ -144,11 +159,13 @@ def further_tables(*, users: bool = True) -> dict[str, type[FurtherTable]]:
 
 
 @functools.cache
-def _import_public() -> None:
-    """Imports all of this package: a class is a table once it exists."""
+def _import_tables() -> None:
+    """Imports all of this package and the tables of applications: a class is a table once it exists."""
     package = sys.modules[__package__]
     for name in package.__all__:
         getattr(package, name)
+    for place in provided("tables").values():
+        place.load()
 
 
 def _names_a_table(cls: Any) -> bool:

@@ -81,6 +81,7 @@ class TeethSection(FurtherTable):
     """
 
     table = "teeth"
+    drive_only = True
 
     pinion: GearTeethSection | None = entry(nested(GearTeethSection))
     wheel: GearTeethSection | None = entry(nested(GearTeethSection))

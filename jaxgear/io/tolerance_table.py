@@ -20,6 +20,7 @@ class ToleranceSection(FurtherTable, _LIMITS):  # type: ignore[misc, valid-type]
     """
 
     table = "tolerance"
+    classified = True
 
     quality_class: int | list[int] | None = entry(QUALITY_CLASSES)
     samples: int = entry(count(2, 100_000), 64)

@@ -26,6 +26,7 @@ class WearSection(FurtherTable, section_of(Wear, ("dynamics", "loads"), open=Fal
     """
 
     table = "wear"
+    drive_only = True
 
     line_load: str = entry(choice("static", "dynamic"), "static")
     torques: list[float] | None = entry(list_of(positive("N m")))

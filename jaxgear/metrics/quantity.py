@@ -201,10 +201,26 @@ _OF_SETTINGS: dict[type[AbstractSettings], dict[str, Quantity]] = {}
 class Vocabulary(Mapping[str, Quantity]):
     """Quantities by name, looked up in both spellings, "ppte" and "ppte_um"."""
 
-    def __init__(self, known: Iterable[Quantity] = ()) -> None:
-        """Holds some quantities."""
-        self._known: dict[str, Quantity] = {}
+    def __init__(
+        self, known: Iterable[Quantity] = (), *, further: Callable[[], Iterable[Quantity]] | None = None
+    ) -> None:
+        """Holds some quantities.
+
+        Args:
+            known: the quantities.
+            further: called at the first look-up, gives quantities to be added.
+        """
+        self._here: dict[str, Quantity] = {}
+        self._further: Callable[[], Iterable[Quantity]] | None = None
         self.add(*known)
+        self._further = further
+
+    @property
+    def _known(self) -> dict[str, Quantity]:
+        if self._further is not None:
+            further, self._further = self._further, None
+            self.add(*further())
+        return self._here
 
     def add(self, *quantities: Quantity) -> None:
         """Adds quantities.
@@ -215,7 +231,7 @@ class Vocabulary(Mapping[str, Quantity]):
         for quantity in quantities:
             if quantity.name in self:
                 raise ValueError(f'quantities: "{quantity.name}" exists already')
-            self._known[quantity.name] = quantity
+            self._here[quantity.name] = quantity
             if quantity.takes is not None:
                 _OF_SETTINGS.setdefault(quantity.takes, {})[quantity.name] = quantity
 
