@@ -1,23 +1,26 @@
 """Applications: folders of this package and other packages that bring tables, quantities, studies, commands, formats.
 
-Nothing of the package imports an application; each is found by its lines in a `pyproject.toml`, and can be deleted:
+Nothing of the package imports an application. A folder of this package says what it brings in `application.toml`, and
+can be deleted; another package says the same in its `pyproject.toml`, under `[project.entry-points."jaxgear.tables"]`
+and so on:
 
-    [project.entry-points."jaxgear.tables"]
+    [tables]
     rating = "jaxgear.rating.table:RatingSection"  # class with `table = "rating"`: of settings, or a `FurtherTable`
-    [project.entry-points."jaxgear.quantities"]
+    [quantities]
     rating = "jaxgear.rating.quantities:RATING_QUANTITIES"  # a `Vocabulary`, added to that of the package
-    [project.entry-points."jaxgear.studies"]
-    heat = "my_package.heat:HeatStudy"  # a subclass of `AbstractStudy`, the command `heat`
+    [studies]
+    rating = "jaxgear.rating.study:RatingStudy"  # a subclass of `AbstractStudy`, the command `rating`
 
 The place of an entry is imported when a file, a quantity or a command is first asked for, not with the package.
 """
 
+import tomllib
 from pathlib import Path
 from typing import Any
 
 
 def provided(group: str) -> dict[str, Any]:
-    """Entry points by their names; without those of folders that have been deleted from this package.
+    """Entry points by their names, those of folders of this package first.
 
     Args:
         group: "tables", "quantities", "studies", "commands" or "formats". A command is a function with the options
@@ -26,7 +29,12 @@ def provided(group: str) -> dict[str, Any]:
     """
     from importlib import metadata  # imported when asked for: it takes longer than the commands need
 
-    return {entry.name: entry for entry in metadata.entry_points(group=f"jaxgear.{group}") if not _deleted(entry.value)}
+    own: dict[str, Any] = {}
+    for file in sorted(Path(__file__).parent.glob("*/application.toml")):
+        for name, place in tomllib.loads(file.read_text(encoding="utf-8")).get(group, {}).items():
+            own[name] = metadata.EntryPoint(name, place, f"jaxgear.{group}")
+    others = metadata.entry_points(group=f"jaxgear.{group}")
+    return own | {entry.name: entry for entry in others if entry.name not in own and not _deleted(entry.value)}
 
 
 def _deleted(place: str) -> bool:

@@ -5,11 +5,13 @@ import os
 import shutil
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import pytest
 
 import jaxgear
+from jaxgear.provided import provided
 
 PACKAGE = Path(jaxgear.__file__).parent
 # folders of the package that no other one imports
@@ -74,6 +76,15 @@ def test_no_other_module_imports_an_application(folder):
         if any(f"{name}.".startswith(f"{application}.") for name in imported(path))
     ]
     assert users == []
+
+
+def test_a_folder_declares_what_it_has_itself():
+    """All that it brings is found in it, so that nothing is left behind where it is deleted."""
+    for file in PACKAGE.glob("*/application.toml"):
+        for group, entries in tomllib.loads(file.read_text(encoding="utf-8")).items():
+            for name, place in entries.items():
+                found = provided(group)[name]
+                assert place.startswith(f"jaxgear.{file.parent.name}") and found.value == place and found.load()
 
 
 def test_without_applications_the_rest_imports_and_runs(tmp_path):

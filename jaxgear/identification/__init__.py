@@ -1,7 +1,7 @@
 """Identification: the values of variables that gave a measured transmission error, and how well it tells them.
 
-The public names are listed in `__init__.pyi` and imported when they are asked for. The command `identify` is an entry
-point of the package.
+The public names are listed in `__init__.pyi` and imported when they are asked for. The command `identify` is named in
+`application.toml`.
 """
 
 import lazy_loader

@@ -1,7 +1,7 @@
 """REXS files (https://www.rexs.info): the open exchange format for gearbox data, read and written.
 
 The public names are listed in `__init__.pyi` and imported when they are asked for. The command `convert` and the format
-`rexs` of results are entry points of the package.
+`rexs` of results are named in `application.toml`.
 """
 
 import lazy_loader
