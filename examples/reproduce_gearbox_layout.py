@@ -161,7 +161,7 @@ def draw(found):
     folder = Path("results")
     lines = found["lines"]["low speed", "bad foundation"][1]
     for step, cases in enumerate((lines.before, lines.after), 1):
-        axes = plot.tolerance_line_load(cases["maximum"], title=f"low speed, step {step}")
+        axes = layout.tolerance_line_load(cases["maximum"], title=f"low speed, step {step}")
         plot.save(np.ravel(axes)[0].figure, folder / f"reproduce_gearbox_layout_step_{step}.png")
     made = found["profiles"]["low speed", "bad foundation"]
     rows, names = made.radar_variants()

@@ -36,7 +36,6 @@ ORDER = (
     "sizing",
     "sweeps",
     "optimize",
-    "layout",
     "io",
     "plot",
     "report",
@@ -44,6 +43,7 @@ ORDER = (
     "cli",
     "rating",
     "identification",
+    "layout",
     "rexs",
 )
 FILES = sorted(PACKAGE.rglob("*.py"))
@@ -104,6 +104,7 @@ HEAVY = {
     "pyarrow",
     "xarray",
     "xlsxwriter",
+    "jaxgear.layout.figures",
     "jaxgear.plot",
 }
 # so do the commands, and their help without any of the library

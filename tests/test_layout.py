@@ -23,6 +23,7 @@ from jaxgear.layout import (
     at_torque,
     crowning_off_the_edges,
     damage,
+    face_load_factors,
     face_load_over_torques,
     flank_line_tolerance,
     gear_lives,
@@ -33,6 +34,7 @@ from jaxgear.layout import (
     lives_in_cases,
     longest_life,
     tolerance_cases,
+    tolerance_line_load,
     vary_profiles,
     without_housing,
 )
@@ -693,16 +695,15 @@ def two_stages_idle():
 
 def test_pictures_mark_the_edges(layout, clean_figures):
     """One curve per case, a cross where an end is touched; negative_crowning marks of the same cases."""
-    from jaxgear import plot
 
     cases = layout.before["maximum"]
-    panel = plot.tolerance_line_load(cases)
+    panel = tolerance_line_load(cases)
     curves = [line for line in panel.get_lines() if len(line.get_xdata()) == STATIONS]
     crosses = [line for line in panel.get_lines() if len(line.get_xdata()) == 1]
     assert len(curves) == len(CASES) and len(crosses) == int(cases.edge_contact.sum()) == 4
     tops = sorted(float(cross.get_ydata()[0]) for cross in crosses)
     np.testing.assert_allclose(tops, np.sort(np.asarray(cases.load.line_load).max(axis=1))[1:])
     assert "[mm]" in panel.get_xlabel() and "[N/mm]" in panel.get_ylabel()
-    panel = plot.face_load_factors({"step 1": cases, "step 2": layout.after["maximum"]})
+    panel = face_load_factors({"step 1": cases, "step 2": layout.after["maximum"]})
     negative_crowning = [line for line in panel.get_lines() if line.get_markerfacecolor() == "white"]
     assert [len(line.get_xdata()) for line in negative_crowning] == [4, 0]

@@ -235,7 +235,7 @@ def test_every_study_of_the_package_is_a_command_of_its_name():
     for name, place in registry.OWN.items():
         study = registry.load(place)
         assert study.name == name and registry.help_of(place)
-    assert set(registry.OWN) >= {"dynamics", "layout", "wear"}
+    assert set(registry.OWN) >= {"dynamics", "wear"}
 
 
 def test_other_packages_are_looked_for_only_where_a_name_is_unknown():

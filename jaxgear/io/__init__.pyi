@@ -7,7 +7,6 @@ from .errors import DesignFileError as DesignFileError
 from .flanks import read_flank as read_flank
 from .folder import result_folder as result_folder
 from .folder import writing as writing
-from .layout_table import LayoutSection as LayoutSection
 from .named_quantities import quantities_of_tables as quantities_of_tables
 from .optimize_table import OptimizeSection as OptimizeSection
 from .optimize_table import Search as Search

@@ -14,9 +14,7 @@ from ..metrics.safety import Strength
 from ..microgeometry import AbstractModification
 from ..numerics import Checked, Given, Numbers, check, real, result
 from ..shafts import AbstractSupport, ShaftSupport, annex_e
-from .flank_line import STATIONS, FlankLine, GearName, at_stations, level_load
-from .life import Damage, damage, longest_life
-from .tolerance_cases import (
+from .cases import (
     CASES,
     FlankLineTolerance,
     ToleranceCases,
@@ -24,6 +22,8 @@ from .tolerance_cases import (
     lives_in_cases,
     tolerance_cases,
 )
+from .flank_line import STATIONS, FlankLine, GearName, at_stations, level_load
+from .life import Damage, damage, longest_life
 
 Scalar = Float[Array, ""]
 

@@ -12,8 +12,19 @@ from numpy.typing import ArrayLike
 from ..contact import Mesh
 from ..metrics import profile_relief
 from ..optimize import Iterate, Optimum
-from .figure import ABOVE_MARKS, captioned, grow, legend_above, line_style, mark_path, marker_style, report_axes, styled
-from .front import ANALYSES_LABEL, best_label, logarithmic, wrapped
+from .figure import (
+    ABOVE_MARKS,
+    captioned,
+    grow,
+    legend_above,
+    line_style,
+    mark_path,
+    marker_style,
+    report_axes,
+    styled,
+    wrapped,
+)
+from .front import ANALYSES_LABEL, best_label, logarithmic
 from .mesh_cycle import PATH_LABEL, PHASE_LABEL, two_pitches
 
 

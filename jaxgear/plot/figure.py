@@ -1,5 +1,6 @@
 """Common parts of all figures: report size, line styles, marks and files."""
 
+import textwrap
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -127,6 +128,15 @@ def point_style(index: int) -> dict[str, Any]:
         "markeredgecolor": colour if hollow else "white",
         "markeredgewidth": 1.2 if hollow else 0.5,
     }
+
+
+_LINE = 34  # letters along an axis of report height, about which a long label is broken
+
+
+def wrapped(text: str, room: int = _LINE) -> str:
+    """A label in lines of at most `room` letters where its words allow it, its unit with the last word."""
+    bound = text.replace(" [", "\N{NO-BREAK SPACE}[")
+    return textwrap.fill(bound, max(room, 1), break_long_words=False, break_on_hyphens=False)
 
 
 @contextmanager

@@ -1,6 +1,5 @@
 """Pareto fronts, and many variants over parallel axes."""
 
-import textwrap
 from collections.abc import Mapping, Sequence
 from typing import Literal
 
@@ -31,12 +30,12 @@ from .figure import (
     point_style,
     report_axes,
     style_number,
+    wrapped,
 )
 from .variants import Of, Table, columns_of, costs, meaning_label, share_text, subsample
 
 ANALYSES_LABEL = "contact analyses spent [-]"
 _NARROW = 5.0  # largest over smallest value below which a logarithmic axis has too few round numbers of its own
-_LINE = 34  # letters along an axis of report height, about which a long label is broken
 
 
 def objective_labels(problem: Problem | None) -> list[str]:
@@ -55,12 +54,6 @@ def best_label(optimum: Optimum) -> str:
     """Label of what a search has made small; of several objectives it is the distance from the ideal."""
     labels = objective_labels(optimum.problem)
     return labels[0] if len(labels) == 1 else "distance from the ideal [-]"
-
-
-def wrapped(text: str, room: int = _LINE) -> str:
-    """A label in lines of at most `room` letters where its words allow it, its unit with the last word."""
-    bound = text.replace(" [", "\N{NO-BREAK SPACE}[")
-    return textwrap.fill(bound, max(room, 1), break_long_words=False, break_on_hyphens=False)
 
 
 def logarithmic(ax: Axes, which: Literal["x", "y"], values: ArrayLike) -> None:

@@ -14,8 +14,6 @@ from .evaluation import Evaluation as Evaluation
 from .evaluation import evaluation_of as evaluation_of
 from .export import ExportResult as ExportResult
 from .export import ExportStudy as ExportStudy
-from .layout import LayoutStudy as LayoutStudy
-from .layout_result import LayoutResult as LayoutResult
 from .optimization_result import OptimizationResult as OptimizationResult
 from .progress import Progress as Progress
 from .progress import Stages as Stages

@@ -20,7 +20,6 @@ OWN = {
         "analyze": "analysis:AnalysisStudy",
         "optimize": "analysis:OptimizationStudy",
         "sweep": "sweep:SweepStudy",
-        "layout": "layout:LayoutStudy",
         "dynamics": "dynamics:DynamicsStudy",
         "wear": "wear:WearStudy",
         "revolution": "revolution:RevolutionStudy",

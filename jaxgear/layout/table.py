@@ -5,16 +5,16 @@ from pathlib import Path
 from typing import Any, Self
 
 from ..conditions import LoadSpectrum
-from ..layout import FlankLineTolerance, flank_line_tolerance, helix_slope_limits
+from ..io.design_file import DesignFile
+from ..io.errors import DesignFileError, refused
+from ..io.gears import both_classes
+from ..io.table_keys import FileTable, entry, nested
+from ..io.tables import FurtherTable
+from ..io.template import Part
+from ..io.value_types import QUALITY_CLASSES, choice, count, either, list_of, positive, real, switch
 from ..numerics import Number
 from ..shafts import Misalignment
-from .design_file import DesignFile
-from .errors import DesignFileError, refused
-from .gears import both_classes
-from .table_keys import FileTable, entry, nested
-from .tables import FurtherTable
-from .template import Part
-from .value_types import QUALITY_CLASSES, choice, count, either, list_of, positive, real, switch
+from .cases import FlankLineTolerance, flank_line_tolerance, helix_slope_limits
 
 _AMOUNTS = list_of(real(Number("um", low=0.0)))
 _FURTHER = list_of(real(Number("um")))

@@ -10,28 +10,18 @@ import numpy as np
 from ..contact import Mesh, MeshCycle, Resolution, solve
 from ..io import DesignFile, DesignFileError
 from ..io.errors import naming
-from ..io.layout_table import ProfileSection
-from ..layout import (
-    FlankLine,
-    FlankLineLayout,
-    FlankLineTolerance,
-    ProfileLayout,
-    at_stations,
-    at_torque,
-    face_load_over_torques,
-    flank_line_contact,
-    layout_findings,
-    layout_flank_lines,
-    vary_profiles,
-    without_housing,
-)
 from ..shafts import AbstractSupport, ShaftSupport, annex_e
-from . import manufactured
-from .checkpoints import Checkpoints
-from .evaluation import coarse, face_change
-from .layout_result import LayoutResult, flank_lines
-from .progress import Stages
-from .study import AbstractStudy
+from ..studies import AbstractStudy, Checkpoints, Stages
+from ..studies.evaluation import coarse, face_change
+from ..studies.manufactured import left_out
+from .cases import FlankLineTolerance
+from .findings import layout_findings
+from .flank_line import FlankLine, at_stations, at_torque
+from .life import face_load_over_torques
+from .profiles import ProfileLayout, flank_line_contact, vary_profiles
+from .result import LayoutResult, flank_lines
+from .steps import FlankLineLayout, layout_flank_lines, without_housing
+from .table import ProfileSection
 
 _QUICK_STATIONS, _QUICK_AMOUNTS = 21, 3
 _TORQUES, _QUICK_TORQUES = 25, 7  # over the range of the file
@@ -86,7 +76,7 @@ class LayoutStudy(AbstractStudy[LayoutResult]):
 
     def omits(self) -> str:
         """Tolerances other than those of the flank lines."""
-        return manufactured.left_out(self.design, "flank lines deviate by the limits of [layout]")
+        return left_out(self.design, "flank lines deviate by the limits of [layout]")
 
     def work_out(self, checkpoints: Checkpoints, stages: Stages) -> LayoutResult:
         """Flank lines on every support, then profile modifications; keeps no checkpoints."""

@@ -11,17 +11,21 @@ from ..contact import Mesh, MeshCycle
 from ..contact.kinematics import kinematics
 from ..contact.status import Status
 from ..io import DesignFile, write_flanks
-from ..layout import CASES, FlankLine, FlankLineLayout, FlankLineTolerance, ProfileLayout, ToleranceCases, gear_lives
 from ..metrics import Finding
 from ..microgeometry import AbstractModification
 from ..numerics import Given, UnitKey, real
 from ..report import Figure, Record, Table, table_of
 from ..shafts import ShaftSupport, bearing_reactions, root_face_load_factor, tooth_height
+from ..studies import AbstractStudyResult
+from ..studies.evaluation import grid_lines
+from ..studies.side_by_side import finding_lines
+from ..studies.summary_data import finding_data, flanks_data
 from ..sweeps.columns import described
-from .evaluation import grid_lines
-from .side_by_side import finding_lines
-from .study import AbstractStudyResult
-from .summary_data import finding_data, flanks_data
+from .cases import CASES, FlankLineTolerance, ToleranceCases
+from .flank_line import FlankLine
+from .life import gear_lives
+from .profiles import ProfileLayout
+from .steps import FlankLineLayout
 
 STEPS = ("unmodified", "step 1", "step 2")
 LIVES = UnitKey("pinion_life", "h"), UnitKey("wheel_life", "h")
@@ -313,16 +317,17 @@ class LayoutResult(AbstractStudyResult):
     def figures(self) -> Iterator[Figure]:
         """The cases, K_Hbeta over the torque, shafts, profiles and the contact."""
         from .. import plot
+        from . import figures
 
         steps, name = dict(zip(STEPS, self.main.cases)), list(self.main.after)[-1]
 
         def draw(panel: Any, step: str) -> None:
-            plot.tolerance_line_load(steps[step][name], panel, title=f"{step}, {name} deviations")
+            figures.tolerance_line_load(steps[step][name], panel, title=f"{step}, {name} deviations")
 
         caption = "Load over the face under the combinations of deviations within the tolerances."
         yield Figure("tolerance_cases", caption, plot.panels(draw, steps, width=_PANEL, height=_HEIGHT))
         shown = {f"{step}, {kind}": one for step, of in steps.items() for kind, one in of.items()}
-        yield Figure.of(plot.face_load_factors, shown)
+        yield Figure.of(figures.face_load_factors, shown)
         loads = {"design_torque": self.design.torque}
         yield Figure.of(plot.face_load_over_torque, self.torques, self.over_torque, **loads)
         yield Figure.of(plot.shaft_deflection, next(iter(self.supports.values())).gearbox)

@@ -1,0 +1,32 @@
+"""The public names, for type checkers and for `__init__.py`, which imports each when it is asked for."""
+
+from .cases import CASES as CASES
+from .cases import FlankLineTolerance as FlankLineTolerance
+from .cases import ToleranceCases as ToleranceCases
+from .cases import crowning_off_the_edges as crowning_off_the_edges
+from .cases import flank_line_tolerance as flank_line_tolerance
+from .cases import helix_slope_limits as helix_slope_limits
+from .cases import lives_in_cases as lives_in_cases
+from .cases import tolerance_cases as tolerance_cases
+from .figures import face_load_factors as face_load_factors
+from .figures import tolerance_line_load as tolerance_line_load
+from .findings import layout_findings as layout_findings
+from .flank_line import FlankLine as FlankLine
+from .flank_line import Stations as Stations
+from .flank_line import at_stations as at_stations
+from .flank_line import at_torque as at_torque
+from .flank_line import level_load as level_load
+from .life import Damage as Damage
+from .life import damage as damage
+from .life import face_load_over_torques as face_load_over_torques
+from .life import gear_lives as gear_lives
+from .life import longest_life as longest_life
+from .profiles import ProfileLayout as ProfileLayout
+from .profiles import flank_line_contact as flank_line_contact
+from .profiles import vary_profiles as vary_profiles
+from .result import LayoutResult as LayoutResult
+from .steps import FlankLineLayout as FlankLineLayout
+from .steps import layout_flank_lines as layout_flank_lines
+from .steps import without_housing as without_housing
+from .study import LayoutStudy as LayoutStudy
+from .table import LayoutSection as LayoutSection
