@@ -16,6 +16,7 @@ from jaxgear import plot
 from jaxgear.io import load_design
 from jaxgear.layout import LayoutResult, LayoutStudy, at_stations, layout_flank_lines
 from jaxgear.metrics import face_load_factor
+from jaxgear.report import Figure
 from jaxgear.vocabulary import quantities
 
 pytestmark = pytest.mark.usefixtures("no_cache")
@@ -243,11 +244,8 @@ def test_the_radar_has_the_lives_of_both_gears(file, monkeypatch):
     """Where there is a duty cycle; that without any K_Hbeta has no life."""
     design = load_design(file(FILE + LIFE))
     asked, drawn = LayoutStudy.of(design, quick=True), []
-    figures = importlib.import_module("jaxgear.layout.figures")
-    monkeypatch.setattr(figures, "face_load_factors", lambda *given, **options: None)
-    for name in "face_load_over_torque", "shaft_deflection":
-        monkeypatch.setattr(plot, name, lambda *given, **options: None)
-    monkeypatch.setattr(plot, "radar", lambda table, *_: drawn.append(table))
+    monkeypatch.setattr(plot, "panels", lambda *given, **options: None)
+    monkeypatch.setattr(Figure, "of", lambda draw, *given, **_: drawn.append(given[0]) if draw is plot.radar else None)
     profile = SimpleNamespace(
         table=SimpleNamespace(
             column=lambda name: np.asarray([1.2, 1.0, np.nan]),
@@ -258,7 +256,7 @@ def test_the_radar_has_the_lives_of_both_gears(file, monkeypatch):
     layout = SimpleNamespace(after={"maximum": None}, cases=[])
     study = SimpleNamespace(**{**vars(asked), "profile": profile}, main=layout, over_torque={}, cycles={}, profiles={})
     study.lives = lambda profile: LayoutResult.lives(study, profile)
-    assert list(LayoutResult.figures(study))[-1] == "radar"
+    list(LayoutResult.figures(study))
     (values,) = drawn
     lives = list(values)[-2:]
     assert [(of.key, of.better) for of in lives] == [("pinion_life_h", "larger"), ("wheel_life_h", "larger")]
@@ -266,7 +264,7 @@ def test_the_radar_has_the_lives_of_both_gears(file, monkeypatch):
         uneven, even, none = values[of]
         assert uneven / even == pytest.approx(1.2**-6.6, rel=1e-9) and np.isnan(none)
     study.options = {}
-    LayoutResult.figures(study)
+    list(LayoutResult.figures(study))
     assert list(drawn[1]) == list(values)[:-2]
 
 
