@@ -36,8 +36,7 @@ _LONGER, _SHORTER = 1.4, 0.6
 _TURN = 0.95  # least cosine of the angle between neighbouring tangents
 _SHORTEST = 1e-3  # of the first step; shorter ones turn with the corner of a branch, however sharp
 _LONGEST = 4.0
-_LOCATED = 1e-9  # part of a step to which a bifurcation is located
-_HALVINGS = 60
+_LOCATED = 1e-6  # part of a step to which a bifurcation is located
 
 
 class Branch(Checked):
@@ -223,21 +222,19 @@ class _Follower:
     def located(
         self, kind: Kind, test: Callable[[Tests], float], beyond: Tests, step: float
     ) -> tuple[float, Bifurcation | None]:
-        """A bifurcation before the next point, by false position with halved ends (Illinois), and its distance."""
-        a, b, left, right = 0.0, step, test(self.tests), test(beyond)
-        side = 0
-        for _ in range(_HALVINGS):
-            middle = (a * right - b * left) / (right - left)
-            point, orbit = self.along(middle)
-            value = test(tests_of(point))
-            if not abs(value) > _LOCATED or b - a < _LOCATED * step:
-                break
-            if value * right > 0:
-                b, right, left = middle, value, left * (0.5 if side == 1 else 1.0)
-                side = 1
-            else:
-                a, left, right = middle, value, right * (0.5 if side == -1 else 1.0)
-                side = -1
+        """A bifurcation before the next point, and its distance.
+
+        By Brent's method, which halves the distance where the branch has a corner, at which the tangent jumps.
+        """
+        from scipy.optimize import brentq  # imported when asked for: it takes longer than what is done without it
+
+        known = {0.0: test(self.tests), step: test(beyond)}
+
+        def at(distance: float) -> float:
+            return known[distance] if distance in known else test(tests_of(self.along(distance)[0]))
+
+        middle = brentq(at, 0.0, step, xtol=_LOCATED * step)
+        point, orbit = self.along(middle)
         return middle, bifurcation_at(kind, self.scales.unknowns(point.place)[1], point, orbit)
 
     def branch(self, ended: Ended) -> Branch:
@@ -264,7 +261,8 @@ def _point(family, guess, normal, scales: Scales, nodes, periods: int) -> tuple[
     point = corrected(family, guess, normal, scales, nodes, periods)
     z, parameter = scales.unknowns(point.place)
     oscillator, frequency = family(parameter)
-    return point, orbit_at(oscillator, z, steps_at(oscillator, nodes), frequency, periods)
+    steps = steps_at(oscillator, nodes)
+    return point, orbit_at(oscillator, z, steps, frequency, periods, monodromy=point.monodromy)
 
 
 def _joins(here: Orbit, there: Orbit) -> bool:

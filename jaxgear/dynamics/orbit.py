@@ -267,14 +267,25 @@ def settled_orbit(
     return dataclasses.replace(orbit, status=status)
 
 
-def orbit_at(oscillator: Oscillator, z: Unknowns, steps: Steps, frequency: Scalar, periods: int) -> Orbit:
-    """Orbit over `periods` mesh cycles from the unknowns z, with its monodromy matrix and residual."""
+def orbit_at(
+    oscillator: Oscillator,
+    z: Unknowns,
+    steps: Steps,
+    frequency: Scalar,
+    periods: int,
+    *,
+    monodromy: Float[Array, "unknowns unknowns"] | None = None,
+) -> Orbit:
+    """Orbit over `periods` mesh cycles from the unknowns z, with its monodromy matrix where that is not given."""
 
     def flown(z):
         end, states = cycles(oscillator, unscaled(z, frequency), steps, frequency, periods)
         return scaled(end, frequency), (end, states)
 
-    last, monodromy, (end, states) = with_jacobian(flown, z, has_aux=True)
+    if monodromy is None:
+        last, monodromy, (end, states) = with_jacobian(flown, z, has_aux=True)
+    else:
+        last, (end, states) = flown(z)
     of = history(oscillator, states, end, steps, frequency)
     residual = jnp.max(jnp.abs(last - z))
     x, v = unscaled(z, frequency)

@@ -41,6 +41,12 @@ class Run(NamedTuple):
     kicks: Sequence[float] | jax.Array = ()
 
 
+def with_like_kicks(runs: Mapping[str, Run]) -> dict[str, Run]:
+    """Runs with as many kicks each, those added being none."""
+    most = max(len(run.kicks) for run in runs.values())
+    return {name: run._replace(kicks=(*run.kicks, *[1.0] * (most - len(run.kicks)))) for name, run in runs.items()}
+
+
 def speed_runs(oscillator: Oscillator, mesh_frequencies: Numbers, runs: Mapping[str, Run], **options: Any) -> Responses:
     """`speed_sweep` of one oscillator for each of some runs, one after the other in one program.
 
@@ -158,9 +164,7 @@ def _itself(oscillator: Oscillator) -> Oscillator:
 
 def _prepared(frequencies, runs: Mapping[str, Run], options: dict):
     """Static sizes of all runs, and the limits of each with a leading axis (runs,)."""
-    most = max(len(run.kicks) for run in runs.values())
-    ways = [run._replace(kicks=(*run.kicks, *[1.0] * (most - len(run.kicks)))) for run in runs.values()]
-    each = [prepared(None, frequencies, **run._asdict(), **options) for run in ways]
+    each = [prepared(None, frequencies, **run._asdict(), **options) for run in with_like_kicks(runs).values()]
     return each[0][0], jax.tree.map(lambda *parts: jnp.stack(parts), *(limits for _, limits in each))
 
 

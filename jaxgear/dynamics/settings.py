@@ -17,7 +17,7 @@ from .force import AbstractMeshForce
 from .from_contact import Model, force_and_mesh
 from .oscillator import Oscillator
 from .response import SpeedResponse
-from .runs import Run, design_runs, speed_runs
+from .runs import Run, design_runs, speed_runs, with_like_kicks
 from .speed_sweep import MOST_KICK, speed_sweep
 from .steady import SteadyForce, SteadyNumbers, differentiable, steady_force
 from .systems import DIRECTIONS, inertia_of, on_bearings, torsional
@@ -178,7 +178,8 @@ class Dynamics(AbstractSettings):
             steps: of the integrator per mesh cycle, in place of `steps`; one number or one for each speed.
         """
         steps = self.steps if steps is None else steps
-        return speed_sweep(oscillator, self.mesh_frequencies, steps=steps, **self._runs[name]._asdict())
+        run = with_like_kicks(self._runs)[name]  # so that one program does all of them
+        return speed_sweep(oscillator, self.mesh_frequencies, steps=steps, **run._asdict())
 
     @property
     def _runs(self) -> dict[str, Run]:

@@ -35,18 +35,22 @@ from .progress import Stages
 from .study import AbstractStudy
 
 _QUICK_SPEEDS = 24
-_POINTS = 400  # of a branch: through the folds of an unmodified pair it takes about 120
+_POINTS = 400  # of a branch
+_STEP, _QUICK_STEP = 0.02, 0.06  # first step along a branch, of `follow_orbits`: about 330 points and 190
 _SAME = 1e-3  # relative difference of dynamic factors of one orbit, by two integrations
 _BESIDE = 4  # speeds on either side of a peak that are gone through again on a finer grid
 
 
-def branches_of(oscillator: Oscillator, runs: Mapping[str, SpeedResponse], steps: tuple[int, ...]) -> list[Branch]:
+def branches_of(
+    oscillator: Oscillator, runs: Mapping[str, SpeedResponse], steps: tuple[int, ...], step: float = _STEP
+) -> list[Branch]:
     """The branch of the lowest speed, and those that falling runs begin on, each once.
 
     Args:
         oscillator: one oscillator.
         runs: by name.
         steps: of the integrator per mesh cycle, at every speed.
+        step: first one along a branch.
     """
     found: list[Branch] = []
     for name, response in runs.items():
@@ -55,18 +59,21 @@ def branches_of(oscillator: Oscillator, runs: Mapping[str, SpeedResponse], steps
             continue
         place = int(speeds[0] if name == UP else speeds[-1])
         if not any(_on(branch, response, place) for branch in found):
-            found += _followed(oscillator, response, place, "up" if name == UP else "down", max(steps))
+            found += _followed(oscillator, response, place, "up" if name == UP else "down", max(steps), step)
     return found
 
 
-def _followed(oscillator, response: SpeedResponse, place: int, direction: Any, steps: int) -> Iterator[Branch]:
+def _followed(
+    oscillator, response: SpeedResponse, place: int, direction: Any, steps: int, step: float
+) -> Iterator[Branch]:
     frequencies = np.asarray(response.mesh_frequency, float)
     periods, start = int(response.period[place]), jax.tree.map(lambda part: np.asarray(part)[place], response.state)
     orbit = find_orbit(oscillator, frequencies[place], start, periods=periods, steps=steps)
     if not bool(orbit.converged):
         return
     within = frequencies[0], frequencies[-1]
-    yield follow_orbits(oscillator, orbit, within=within, direction=direction, points=_POINTS, steps=steps)
+    options: dict[str, Any] = {"within": within, "direction": direction, "points": _POINTS, "step": step}
+    yield follow_orbits(oscillator, orbit, steps=steps, **options)
 
 
 def _on(branch: Branch, response: SpeedResponse, place: int) -> bool:
@@ -215,7 +222,8 @@ class DynamicsStudy(AbstractStudy[DynamicsResult]):
         stages.begin("following the orbits of the unmodified design")
         torque = next_to_design(design, self.torques)
         runs = responses["unmodified"][torque]
-        branches = branches_of(oscillators["unmodified"][torque], {UP: runs[UP]} if self.quick else runs, steps)
+        followed, step = ({UP: runs[UP]}, _QUICK_STEP) if self.quick else (runs, _STEP)
+        branches = branches_of(oscillators["unmodified"][torque], followed, steps, step)
         frequencies = {
             name: {torque: float(of.mesh) for torque, of in several.items()} for name, several in natural.items()
         }
