@@ -16,9 +16,10 @@ from ..contact import MeshCycle
 from ..geometry import GearPair, path_of_contact, reduced_radius
 from ..numerics import Given, check, over_batch, over_slices, real, safe_divide, safe_power, safe_sqrt
 from .load_distribution import slice_forces
-from .lubricant import Lubricant
+from .lubricant import FrictionLaw, Lubricant
 
 Load = Float[Array, "pairs slices positions"]
+Real = Float[Array, "..."]
 
 _BLOK_FACTOR = 1.13  # 2 / sqrt(pi), semi-elliptic heat flux (ISO/TS 6336-20, where Blok's own 1.11 is rounded)
 
@@ -56,14 +57,31 @@ def _flash(cycle: MeshCycle, speed, friction) -> Load:
     pinion_speed, wheel_speed = kinematics.path_of_contact.rolling_speeds(kinematics.contact_path, speed)
     reduced = over_slices(_normal(pair, reduced_radius(pinion.contact_roll_length, wheel.contact_roll_length)))
     modulus = combined_modulus(pair.pinion.material, pair.wheel.material, kinematics.plane)
-    half_width = safe_sqrt(4 * cycle.line_load * reduced / modulus / jnp.pi) * 1e-3  # [m]
-    heat = friction * cycle.line_load * 1e3 * over_slices(jnp.abs(pinion_speed - wheel_speed))
-    sink = pair.pinion.material.thermal_contact_coefficient * safe_sqrt(
-        pinion_speed
-    ) + pair.wheel.material.thermal_contact_coefficient * safe_sqrt(wheel_speed)
-    # no heat makes no rise, also where it is not conducted; heat that is not finite stays so
-    rise = _BLOK_FACTOR * safe_divide(heat, over_slices(sink) * safe_sqrt(2 * half_width), default=0.0 * heat)
+    speeds = over_slices(pinion_speed), over_slices(wheel_speed)
+    rise = flash_rise(friction, cycle.line_load, reduced, modulus, speeds, pair)
     return jnp.where(over_slices(kinematics.contact_outside <= 0), rise, 0.0)
+
+
+def flash_rise(
+    friction: Given, line_load: Real, radius: Real, modulus: Real, speeds: tuple[Real, Real], pair: GearPair
+) -> Real:
+    """Blok's rise of the temperature of two flanks [K], the formula of `flash_temperature`.
+
+    Args:
+        friction: coefficient.
+        line_load: along the contact line [N/mm].
+        radius: relative radius of curvature in the section normal to it [mm].
+        modulus: E* of both flanks [MPa].
+        speeds: of both surfaces through the contact [m/s].
+        pair: for the thermal constants of its materials.
+    """
+    half_width = safe_sqrt(4 * line_load * radius / modulus / jnp.pi) * 1e-3  # [m]
+    heat = friction * line_load * 1e3 * jnp.abs(speeds[0] - speeds[1])
+    sinks = (
+        gear.material.thermal_contact_coefficient * safe_sqrt(speed) for gear, speed in zip(pair.gears, speeds)
+    )
+    # no heat makes no rise, also where it is not conducted; heat that is not finite stays so
+    return _BLOK_FACTOR * safe_divide(heat, sum(sinks) * safe_sqrt(2 * half_width), default=0.0 * heat)
 
 
 def _normal(pair: GearPair, radius: Float[Array, "..."]) -> Float[Array, "..."]:
@@ -107,10 +125,15 @@ def ohlendorf_loss_factor(pair: GearPair) -> Scalar:
         Maschinenelemente II.
     """
     path = path_of_contact(pair)
-    recess, approach = path.end / path.base_pitch, -path.start / path.base_pitch
-    ratio = pair.gear_ratio
+    ratios = path.end / path.base_pitch, -path.start / path.base_pitch
+    return loss_factor_at(pair.pinion.teeth, pair.gear_ratio, ratios, pair.pinion.base_helix_angle)
+
+
+def loss_factor_at(teeth: Real, gear_ratio: Real, tip_contact_ratios: tuple[Real, Real], base_helix: Real) -> Real:
+    """`ohlendorf_loss_factor` of the teeth of the pinion, u, the contact ratios eps_1, eps_2, and beta_b [rad]."""
+    recess, approach = tip_contact_ratios
     share = 1 - (recess + approach) + recess**2 + approach**2
-    return jnp.pi * (ratio + 1) / (pair.pinion.teeth * ratio) * share / jnp.cos(pair.pinion.base_helix_angle)
+    return jnp.pi * (gear_ratio + 1) / (teeth * gear_ratio) * share / jnp.cos(base_helix)
 
 
 # leading constants of the laws of friction
@@ -151,21 +174,35 @@ def friction_coefficient(cycle: MeshCycle, lubricant: Lubricant) -> Scalar:
         return cycle.operating_point.friction
     speed = _running(cycle)
     check("speed", speed, "rpm", low=0.0, open_low=True)
-    contact = cycle.kinematics.path_of_contact
-    radius = _normal(cycle.kinematics.pair, contact.reduced_radius(0.0))
+    contact, pair = cycle.kinematics.path_of_contact, cycle.kinematics.pair
     rolling = sum(contact.rolling_speeds(0.0, speed))
-    line_load = cycle.force / cycle.kinematics.pair.face_width
-    viscosity = 1e3 * lubricant.viscosity(lubricant.temperature)
-    match lubricant.friction:
+    line_load = cycle.force / pair.face_width
+    if lubricant.friction == "iso_6336_22":
+        line_load = line_load * lubricant.load_factor * helical_load_factor(pair)
+    if lubricant.friction == "iso_6336_20":
+        line_load = line_load * jnp.cos(pair.pinion.transverse_pressure_angle) * lubricant.load_factor
+    radius = _normal(pair, contact.reduced_radius(0.0))
+    return mean_friction(lubricant, lubricant.friction, line_load, rolling, radius)
+
+
+def mean_friction(lubricant: Lubricant, law: FrictionLaw, line_load: Real, rolling: Real, radius: Real) -> Real:
+    """The laws of `friction_coefficient` on their own.
+
+    Args:
+        lubricant: at its own temperature.
+        law: one of them; ISO/TS 6336-21 has that of ISO/TS 6336-22.
+        line_load: w with what the law counts in it [N/mm].
+        rolling: sum of the rolling speeds [m/s].
+        radius: relative radius of curvature [mm].
+    """
+    match law:
         case "iso_6336_22":
-            line_load = line_load * lubricant.load_factor * helical_load_factor(cycle.kinematics.pair)
             surface = _ISO_22 * _ISO_22_ROUGHNESS * (lubricant.roughness / radius) ** 0.25
         case "iso_6336_20":
-            tangential = line_load * jnp.cos(cycle.kinematics.pair.pinion.transverse_pressure_angle)
-            line_load = tangential * lubricant.load_factor
             surface = _ISO_20 * lubricant.roughness**0.25
         case _:
             surface = _SCHLENK * lubricant.roughness**0.25
+    viscosity = 1e3 * lubricant.viscosity(lubricant.temperature)
     return surface * safe_power(line_load / (rolling * radius), 0.2) * viscosity**-0.05 * lubricant.slipperiness
 
 
@@ -177,7 +214,12 @@ def helical_load_factor(pair: GearPair) -> Scalar:
     References:
         ISO/TS 6336-21 (ISO/TR 13989-2); ISO/TS 6336-22 (ISO/TR 15144-1).
     """
-    ratio = jnp.clip(path_of_contact(pair).contact_ratio + pair.overlap_ratio, 2.0, 3.5)
+    return helical_load_factor_at(path_of_contact(pair).contact_ratio + pair.overlap_ratio)
+
+
+def helical_load_factor_at(total_contact_ratio: Real) -> Real:
+    """`helical_load_factor` at a total contact ratio."""
+    ratio = jnp.clip(total_contact_ratio, 2.0, 3.5)
     return 1 + 0.2 * safe_sqrt((ratio - 2) * (5 - ratio))
 
 
@@ -226,10 +268,20 @@ def bulk_temperature(cycle: MeshCycle, lubricant: Lubricant) -> Scalar:
     """
     if lubricant.bulk == "loss":
         area = _center_distance(cycle) * cycle.kinematics.pair.face_width
-        rise = _LOSS_RISE * safe_power(1e-3 * loss_power(cycle, lubricant) / area, _LOSS_EXPONENT) / _SPRAY
+        rise = loss_rise(loss_power(cycle, lubricant), area)
     else:
         rise = _FLASH_SHARE * _mean_over_path(cycle, lubricated_flash_temperature(cycle, lubricant))
     return lubricant.temperature + lubricant.cooling_factor * rise
+
+
+def loss_rise(loss: Real, area: Real) -> Real:
+    """Rise of the bulk temperature [K] for a cooling factor of 1, by the law "loss" of `bulk_temperature`.
+
+    Args:
+        loss: power loss of the flanks [W].
+        area: centre distance times face width [mm^2].
+    """
+    return _LOSS_RISE * safe_power(1e-3 * loss / area, _LOSS_EXPONENT) / _SPRAY
 
 
 @over_batch
@@ -258,17 +310,34 @@ def film_thickness(cycle: MeshCycle, lubricant: Lubricant) -> Load:
     speeds = kinematics.path_of_contact.rolling_speeds(kinematics.contact_path, speed)
     rolling, pair = over_slices(speeds[0] + speeds[1]), kinematics.pair
     radius = over_slices(_normal(pair, reduced_radius(pinion.contact_roll_length, wheel.contact_roll_length)))
-    modulus = 2e6 * combined_modulus(pair.pinion.material, pair.wheel.material, kinematics.plane)  # E_r [Pa]
-    bulk, hot = bulk_temperature(cycle, lubricant), contact_temperature(cycle, lubricant)
-    viscosity, coefficient = lubricant.viscosity(bulk), lubricant.pressure_viscosity(bulk)
-    material = safe_power(coefficient * modulus, 0.6)
-    motion = safe_power(viscosity * rolling / (2e-3 * modulus * radius), 0.7)
-    pressure = 1e6 * cycle.contact_pressure * jnp.sqrt(lubricant.load_factor)
+    modulus = 2 * combined_modulus(pair.pinion.material, pair.wheel.material, kinematics.plane)
+    temperatures = bulk_temperature(cycle, lubricant), contact_temperature(cycle, lubricant)
+    pressure = cycle.contact_pressure * jnp.sqrt(lubricant.load_factor)
     apart = pressure <= 0
-    load = (2 * jnp.pi * (jnp.where(apart, 1.0, pressure) / modulus) ** 2) ** -0.13
-    thinning = lubricant.pressure_viscosity(hot) * lubricant.viscosity(hot) / (coefficient * viscosity)
-    film = 1e3 * _FILM * radius * material * motion * load * safe_power(thinning, 0.22)
+    film = film_between(lubricant, radius, rolling, jnp.where(apart, 1.0, pressure), modulus, temperatures)
     return jnp.where(apart, _THICKEST, jnp.minimum(film, _THICKEST))
+
+
+def film_between(
+    lubricant: Lubricant, radius: Real, rolling: Real, pressure: Real, modulus: Real, temperatures: tuple[Real, Real]
+) -> Real:
+    """The formula of `film_thickness` on its own [um].
+
+    Args:
+        lubricant: oil.
+        radius: normal relative radius of curvature [mm].
+        rolling: sum of the rolling speeds [m/s].
+        pressure: of Hertz, greater than 0 [MPa].
+        modulus: E_r = 2 E* [MPa].
+        temperatures: of the teeth and in the contact [degC].
+    """
+    bulk, hot = temperatures
+    viscosity, coefficient = lubricant.viscosity(bulk), lubricant.pressure_viscosity(bulk)
+    material = safe_power(1e6 * coefficient * modulus, 0.6)
+    motion = safe_power(viscosity * rolling / (2e3 * modulus * radius), 0.7)
+    load = (2 * jnp.pi * (pressure / modulus) ** 2) ** -0.13
+    thinning = lubricant.pressure_viscosity(hot) * lubricant.viscosity(hot) / (coefficient * viscosity)
+    return 1e3 * _FILM * radius * material * motion * load * safe_power(thinning, 0.22)
 
 
 @over_batch
