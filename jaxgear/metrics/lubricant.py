@@ -71,6 +71,19 @@ class Lubricant(AbstractSettings):
         cooling_factor: X_S of that law, 1 for dip and 1.2 for spray lubrication.
         permissible_film: specific film thickness lambda_GFP below which micropitting is to be expected, from a test.
         scuffing_temperature: contact temperature at which the oil fails, from a test.
+        fzg_stage: load stage at which the oil fails in the FZG scuffing test A/8.3/90 (ISO 14635-1), for the scuffing
+            temperatures of a rating.
+        structure_factor: X_W of the flanks, X_WrelT against those of the test: 1 for normal steel, 1.15 case-hardened
+            with less than 10 % austenite and 0.85 with more than 20 %, 1.25 phosphated, 1.5 copper-plated or nitrided,
+            0.45 stainless.
+        run_in: phi_E, from 0 of new flanks to 1 of those that are run in.
+        micropitting_test: pinion torque of the failure stage of the FZG micropitting test C-GF/8.3/90 (FVA 54), for the
+            permissible film of a rating: 70.0, 98.9, 132.5, 171.6, 215.6, 265.1 N m of stages 5 to 10.
+        micropitting_test_film: specific film thickness lambda_GFT of that test, where it is known in place of a torque.
+        pinion_immersion, wheel_immersion: depths to which the gears dip into the oil at rest, for the losses without
+            load.
+        splash_factor: C_Sp of the no-load loss, 1 for spray lubrication; see `rating.splash_factor`.
+        oil_volume: of the bath, for the churning loss.
         load_factor: product of the load factors, K_A K_gamma K_v K_Hbeta K_Halpha as far as the contact analysis does
             not know them, for friction by ISO, flash temperature and film. The power loss, and with `bulk` = "loss" the
             bulk temperature, count the torque itself.
@@ -90,8 +103,19 @@ class Lubricant(AbstractSettings):
     permissible_film: Scalar | None = number("", low=0.0, open_low=True, optional=True, default=None)
     scuffing_temperature: Scalar | None = number("degC", low=0.0, high=2000.0, optional=True, default=None)
     load_factor: Scalar = number("", low=0.0, high=100.0, open_low=True, default=1.0)
+    fzg_stage: Scalar | None = number("", low=5.0, high=14.0, optional=True, default=None)
+    structure_factor: Scalar = number("", low=0.1, high=2.0, default=1.0)
+    run_in: Scalar = number("", low=0.0, high=1.0, default=0.0)
+    micropitting_test: Scalar | None = number("N m", low=50.0, high=500.0, optional=True, default=None)
+    micropitting_test_film: Scalar | None = number("", low=0.0, open_low=True, optional=True, default=None)
+    pinion_immersion: Scalar | None = number("mm", low=0.0, optional=True, default=None)
+    wheel_immersion: Scalar | None = number("mm", low=0.0, optional=True, default=None)
+    splash_factor: Scalar = number("", low=0.0, high=10.0, default=1.0)
+    oil_volume: Scalar | None = number("dm^3", low=0.0, open_low=True, optional=True, default=None)
 
     def check_together(self) -> None:
+        if self.micropitting_test is not None and self.micropitting_test_film is not None:
+            raise ValueError("Lubricant: micropitting_test has no effect beside micropitting_test_film, give either")
         _check_less(self, "viscosity_100", "viscosity_40", "mm2/s")
         _check_less(self, "temperature", "scuffing_temperature", "degC")
 

@@ -139,7 +139,7 @@ def loss_factor_at(teeth: Real, gear_ratio: Real, tip_contact_ratios: tuple[Real
 # leading constants of the laws of friction
 _SCHLENK, _ISO_20, _ISO_22 = 0.048, 0.060, 0.045
 _ISO_22_ROUGHNESS = 2.2
-_FLASH_SHARE = 0.47  # of the mean flash temperature that the teeth take on (ISO/TS 6336-20)
+FLASH_SHARE = 0.47  # of the mean flash temperature that the teeth take on (ISO/TS 6336-20)
 # rise of the bulk temperature [K] with kW per mm2 of centre distance times face width; 1.2 for spray (ISO/TS 6336-22)
 _LOSS_RISE, _LOSS_EXPONENT, _SPRAY = 7400.0, 0.72, 1.2
 _FILM = 1.6  # film thickness over radius (Dowson and Higginson, as in ISO/TS 6336-22)
@@ -270,7 +270,7 @@ def bulk_temperature(cycle: MeshCycle, lubricant: Lubricant) -> Scalar:
         area = _center_distance(cycle) * cycle.kinematics.pair.face_width
         rise = loss_rise(loss_power(cycle, lubricant), area)
     else:
-        rise = _FLASH_SHARE * _mean_over_path(cycle, lubricated_flash_temperature(cycle, lubricant))
+        rise = FLASH_SHARE * _mean_over_path(cycle, lubricated_flash_temperature(cycle, lubricant))
     return lubricant.temperature + lubricant.cooling_factor * rise
 
 
