@@ -58,12 +58,18 @@ def _flash(cycle: MeshCycle, speed, friction) -> Load:
     reduced = over_slices(_normal(pair, reduced_radius(pinion.contact_roll_length, wheel.contact_roll_length)))
     modulus = combined_modulus(pair.pinion.material, pair.wheel.material, kinematics.plane)
     speeds = over_slices(pinion_speed), over_slices(wheel_speed)
-    rise = flash_rise(friction, cycle.line_load, reduced, modulus, speeds, pair)
+    sinks = pair.pinion.material.thermal_contact_coefficient, pair.wheel.material.thermal_contact_coefficient
+    rise = flash_rise(friction, cycle.line_load, reduced, modulus, speeds, sinks)
     return jnp.where(over_slices(kinematics.contact_outside <= 0), rise, 0.0)
 
 
 def flash_rise(
-    friction: Given, line_load: Real, radius: Real, modulus: Real, speeds: tuple[Real, Real], pair: GearPair
+    friction: Given,
+    line_load: Given,
+    radius: Given,
+    modulus: Given,
+    speeds: tuple[Given, Given],
+    sinks: tuple[Given, Given],
 ) -> Real:
     """Blok's rise of the temperature of two flanks [K], the formula of `flash_temperature`.
 
@@ -73,15 +79,13 @@ def flash_rise(
         radius: relative radius of curvature in the section normal to it [mm].
         modulus: E* of both flanks [MPa].
         speeds: of both surfaces through the contact [m/s].
-        pair: for the thermal constants of its materials.
+        sinks: thermal contact coefficients of both materials [N/(m s^0.5 K)].
     """
     half_width = safe_sqrt(4 * line_load * radius / modulus / jnp.pi) * 1e-3  # [m]
     heat = friction * line_load * 1e3 * jnp.abs(speeds[0] - speeds[1])
-    sinks = (
-        gear.material.thermal_contact_coefficient * safe_sqrt(speed) for gear, speed in zip(pair.gears, speeds)
-    )
+    taken = sinks[0] * safe_sqrt(speeds[0]) + sinks[1] * safe_sqrt(speeds[1])
     # no heat makes no rise, also where it is not conducted; heat that is not finite stays so
-    return _BLOK_FACTOR * safe_divide(heat, sum(sinks) * safe_sqrt(2 * half_width), default=0.0 * heat)
+    return _BLOK_FACTOR * safe_divide(heat, taken * safe_sqrt(2 * half_width), default=0.0 * heat)
 
 
 def _normal(pair: GearPair, radius: Float[Array, "..."]) -> Float[Array, "..."]:
@@ -129,7 +133,7 @@ def ohlendorf_loss_factor(pair: GearPair) -> Scalar:
     return loss_factor_at(pair.pinion.teeth, pair.gear_ratio, ratios, pair.pinion.base_helix_angle)
 
 
-def loss_factor_at(teeth: Real, gear_ratio: Real, tip_contact_ratios: tuple[Real, Real], base_helix: Real) -> Real:
+def loss_factor_at(teeth: Given, gear_ratio: Given, tip_contact_ratios: tuple[Given, Given], base_helix: Given) -> Real:
     """`ohlendorf_loss_factor` of the teeth of the pinion, u, the contact ratios eps_1, eps_2, and beta_b [rad]."""
     recess, approach = tip_contact_ratios
     share = 1 - (recess + approach) + recess**2 + approach**2
@@ -185,7 +189,7 @@ def friction_coefficient(cycle: MeshCycle, lubricant: Lubricant) -> Scalar:
     return mean_friction(lubricant, lubricant.friction, line_load, rolling, radius)
 
 
-def mean_friction(lubricant: Lubricant, law: FrictionLaw, line_load: Real, rolling: Real, radius: Real) -> Real:
+def mean_friction(lubricant: Lubricant, law: FrictionLaw, line_load: Given, rolling: Given, radius: Given) -> Real:
     """The laws of `friction_coefficient` on their own.
 
     Args:
@@ -217,7 +221,7 @@ def helical_load_factor(pair: GearPair) -> Scalar:
     return helical_load_factor_at(path_of_contact(pair).contact_ratio + pair.overlap_ratio)
 
 
-def helical_load_factor_at(total_contact_ratio: Real) -> Real:
+def helical_load_factor_at(total_contact_ratio: Given) -> Real:
     """`helical_load_factor` at a total contact ratio."""
     ratio = jnp.clip(total_contact_ratio, 2.0, 3.5)
     return 1 + 0.2 * safe_sqrt((ratio - 2) * (5 - ratio))
@@ -274,7 +278,7 @@ def bulk_temperature(cycle: MeshCycle, lubricant: Lubricant) -> Scalar:
     return lubricant.temperature + lubricant.cooling_factor * rise
 
 
-def loss_rise(loss: Real, area: Real) -> Real:
+def loss_rise(loss: Given, area: Given) -> Real:
     """Rise of the bulk temperature [K] for a cooling factor of 1, by the law "loss" of `bulk_temperature`.
 
     Args:
@@ -319,7 +323,7 @@ def film_thickness(cycle: MeshCycle, lubricant: Lubricant) -> Load:
 
 
 def film_between(
-    lubricant: Lubricant, radius: Real, rolling: Real, pressure: Real, modulus: Real, temperatures: tuple[Real, Real]
+    lubricant: Lubricant, radius: Given, rolling: Given, pressure: Given, modulus: Given, temperatures: tuple[Given, Given]
 ) -> Real:
     """The formula of `film_thickness` on its own [um].
 

@@ -97,8 +97,9 @@ def mean_over_path(geometry: MeshGeometry, of: Callable[[Real], Real]) -> Scalar
     reach = _buttressed(geometry)
     corners = jnp.sort(jnp.clip(jnp.stack([start, start + reach, inner, pitch, outer, end - reach, end]), start, end))
     half = 0.5 * jnp.diff(corners)
-    values = of((corners[:-1] + half)[:, None] + half[:, None] * _NODES)
-    return jnp.sum(half * (values @ _WEIGHTS)) / (end - start)
+    nodes, weights = jnp.asarray(_NODES, half.dtype), jnp.asarray(_WEIGHTS, half.dtype)
+    values = of((corners[:-1] + half)[:, None] + half[:, None] * nodes[None, :])
+    return jnp.sum(half * (values @ weights)) / (end - start)
 
 
 def pitch_point_friction(

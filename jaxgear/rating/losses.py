@@ -13,7 +13,7 @@ import jax.numpy as jnp
 
 from ..metrics.lubricant import Lubricant
 from ..metrics.lubrication import loss_factor_at
-from ..numerics import Given
+from ..numerics import Given, real
 from .load_sharing import MeshLoad, pitch_point_friction
 from .mesh_geometry import MeshGeometry, Real, Scalar
 
@@ -40,7 +40,7 @@ def mesh_loss(geometry: MeshGeometry, load: MeshLoad, friction: Given) -> Scalar
 
 
 def hydraulic_torque(width: Given, speed: Given, immersion: Given, splash: Given = 1.0) -> Real:
-    """No-load torque of a gear pair by Mauz [N m], an estimate.
+    """No-load torque of a gear pair by Mauz [N m], an estimate from rigs of small gears: b^3 overstates wide ones.
 
         T_H = C_Sp C_1 exp(C_2 v_w / 10)
         C_1 = 0.063 (e_1 + e_2) / 10 + 0.0128 (b / 10)^3,   C_2 = (e_1 + e_2) / 800 + 0.2
@@ -63,7 +63,7 @@ def splash_factor(deepest: Given, pitch_height: Given, hydraulic_length: Given) 
         pitch_height: h_C, of the pitch point above the lowest point of the gears in the oil [mm].
         hydraulic_length: l_h = 4 V / A of the wetted housing [mm].
     """
-    return (4 * deepest / (3 * pitch_height)) ** 1.5 * 2 * pitch_height / hydraulic_length
+    return real(4 * deepest / (3 * pitch_height)) ** 1.5 * 2 * pitch_height / hydraulic_length
 
 
 def churning_loss(

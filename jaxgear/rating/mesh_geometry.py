@@ -129,6 +129,11 @@ class MeshGeometry(Checked):
         return self.tangential_force(torque) / jnp.cos(self.transverse_pressure_angle)
 
 
+def reduced_modulus(geometry: MeshGeometry) -> Scalar:
+    """E_r = 2 / ((1 - nu_1^2) / E_1 + (1 - nu_2^2) / E_2) [MPa]."""
+    return 2 / jnp.sum((1 - geometry.poisson_ratio**2) / geometry.elastic_modulus)
+
+
 def mesh_geometry(pair: GearPair, path: PathOfContact | None = None) -> MeshGeometry:
     """The numbers of a gear pair; differentiable, of one pair, `jax.vmap` makes many.
 

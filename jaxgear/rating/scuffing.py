@@ -15,7 +15,7 @@ from ..metrics.lubricant import Lubricant
 from ..metrics.lubrication import FLASH_SHARE, helical_load_factor_at
 from ..numerics import Checked, Given, result
 from .load_sharing import MeshLoad, load_sharing, mean_over_path, pitch_point_friction, points_of
-from .mesh_geometry import MeshGeometry, OfGears, Real, Scalar
+from .mesh_geometry import MeshGeometry, OfGears, Real, Scalar, reduced_modulus
 
 # pinion torque of the load stages of the FZG test A/8.3/90 (ISO 14635-1) [N m]; stage 13 is between its neighbours
 _STAGES = (5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0, 14.0)
@@ -150,7 +150,7 @@ def flash_scuffing(geometry: MeshGeometry, load: MeshLoad, lubricant: Lubricant)
         line_load=line_load,
         effective_relief=relief,
         angle_factor=angle_factor(geometry),
-        flash_factor=flash_factor(geometry, jnp.zeros(())),
+        flash_factor=flash_factor(geometry, 0.0),
         lubricant_factor=_lubricant_factor(lubricant),
         path_multiplicity_factor=multiple,
         friction=friction,
@@ -185,13 +185,11 @@ def flash_factor(geometry: MeshGeometry, path: Given) -> Real:
 
     Where the materials differ their coefficients count by the roots of the surface speeds, as in Blok's formula.
     """
-    of_gears = (1 - geometry.poisson_ratio**2) / geometry.elastic_modulus
-    modulus = 2 / jnp.sum(of_gears)
     pinion, wheel = geometry.curvatures(path)
     weights = jnp.sqrt(pinion), jnp.sqrt(wheel / geometry.gear_ratio)
     first, second = geometry.thermal_contact_coefficient
     mean = (first * weights[0] + second * weights[1]) / (weights[0] + weights[1])
-    return 1e3**1.5 * modulus**0.25 / mean  # the standard has mm and m in one coefficient
+    return 1e3**1.5 * reduced_modulus(geometry) ** 0.25 / mean  # the standard has mm and m in one coefficient
 
 
 def angle_factor(geometry: MeshGeometry) -> Scalar:
@@ -266,7 +264,8 @@ def temperatures_of_test(lubricant: Lubricant) -> tuple[Scalar, Scalar]:
     if lubricant.fzg_stage is None:
         unknown = jnp.full_like(lubricant.temperature, jnp.nan)
         return unknown, unknown
-    torque = jnp.interp(lubricant.fzg_stage, jnp.asarray(_STAGES), jnp.asarray(_STAGE_TORQUES))
+    stage = lubricant.fzg_stage
+    torque = jnp.interp(stage, *(jnp.asarray(each, stage.dtype) for each in (_STAGES, _STAGE_TORQUES)))
     return 80 + 0.23 * torque, 0.2 * torque * (100 / lubricant.viscosity_40) ** 0.02
 
 

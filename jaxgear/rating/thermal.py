@@ -1,0 +1,75 @@
+"""Scuffing, micropitting and losses of a gear pair together, as a rating with a lubricant has them."""
+
+import jax.numpy as jnp
+
+from ..metrics.lubricant import Lubricant
+from ..numerics import Checked, result
+from .load_sharing import MeshLoad
+from .losses import churning_loss, hydraulic_torque, loss_factor, mesh_friction, mesh_loss
+from .mesh_geometry import MeshGeometry, OfGears, Scalar
+from .micropitting import Micropitting, micropitting
+from .scuffing import FlashScuffing, IntegralScuffing, flash_scuffing, integral_scuffing
+
+
+class ThermalRating(Checked):
+    """What friction does to a mesh; NaN for what the lubricant does not tell enough of.
+
+    Attributes:
+        flash: scuffing by the flash temperature.
+        integral: scuffing by the integral temperature.
+        micropitting: by method B.
+        friction: mu_mz by Schlenk, at the nominal torque.
+        loss_factor: H_v.
+        loss_power: P_VZP of the flanks, at the nominal torque.
+        efficiency: of the mesh, 1 - mu_mz H_v.
+        no_load_loss_power: P_VZ0 by Mauz, an estimate.
+        churning_loss_power: of both gears by Changenet and Velex, an estimate.
+    """
+
+    flash: FlashScuffing
+    integral: IntegralScuffing
+    micropitting: Micropitting
+    friction: Scalar = result()
+    loss_factor: Scalar = result()
+    loss_power: Scalar = result("W")
+    efficiency: Scalar = result()
+    no_load_loss_power: Scalar = result("W")
+    churning_loss_power: Scalar = result("W")
+
+
+def rate_thermal(
+    geometry: MeshGeometry, load: MeshLoad, lubricant: Lubricant, material_factors: OfGears
+) -> ThermalRating:
+    """Scuffing, micropitting and losses.
+
+    Args:
+        geometry: of the mesh.
+        load: on it.
+        lubricant: oil.
+        material_factors: W_W of both gears, see `micropitting.material_factor`.
+    """
+    friction, lost = mesh_friction(geometry, load, lubricant), loss_factor(geometry)
+    depths = lubricant.pinion_immersion, lubricant.wheel_immersion
+    no_load = churned = jnp.full_like(friction, jnp.nan)
+    turn = load.speed * jnp.pi / 30
+    if not all(depth is None for depth in depths):
+        dipped = [jnp.zeros_like(friction) if depth is None else depth for depth in depths]
+        velocity = geometry.pitch_line_speed(load.speed)
+        no_load = turn * hydraulic_torque(geometry.face_width, velocity, sum(dipped), lubricant.splash_factor)
+        if lubricant.oil_volume is not None:
+            churned = sum(
+                churning_loss(geometry, gear, load.speed, depth, lubricant.oil_volume, lubricant)
+                for gear, depth in enumerate(depths)
+                if depth is not None
+            )
+    return ThermalRating(
+        flash=flash_scuffing(geometry, load, lubricant),
+        integral=integral_scuffing(geometry, load, lubricant),
+        micropitting=micropitting(geometry, load, lubricant, material_factors),
+        friction=friction,
+        loss_factor=lost,
+        loss_power=mesh_loss(geometry, load, friction),
+        efficiency=1 - friction * lost,
+        no_load_loss_power=no_load,
+        churning_loss_power=churned,
+    )
