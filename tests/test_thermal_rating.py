@@ -17,7 +17,6 @@ import pytest
 import jaxgear as jg
 from jaxgear.geometry import Material
 from jaxgear.metrics import Lubricant
-from jaxgear.numerics import changed
 from jaxgear.rating import GearRating, mesh_geometry
 from jaxgear.rating.load_sharing import POINTS, MeshLoad, load_sharing, mean_over_path
 from jaxgear.rating.losses import churning_loss, hydraulic_torque, mesh_friction, mesh_loss, splash_factor
@@ -247,7 +246,9 @@ def test_flash_temperature_is_that_of_blok():
 
 def test_materials_count_by_the_speed_of_their_surface():
     geometry = mesh_geometry(rig()[0])
-    pinion, wheel = (replace(geometry, thermal_contact_coefficient=jnp.asarray(both)) for both in ((9e3, 1e4), (1e4, 9e3)))
+    pinion, wheel = (
+        replace(geometry, thermal_contact_coefficient=jnp.asarray(both)) for both in ((9e3, 1e4), (1e4, 9e3))
+    )
     assert float(flash_factor(pinion, geometry.path[-1])) > float(flash_factor(wheel, geometry.path[-1]))
     np.testing.assert_allclose(
         flash_factor(replace(geometry, thermal_contact_coefficient=jnp.full(2, 1e4)), geometry.path),
@@ -327,7 +328,7 @@ def test_churning_by_hand_and_without_a_jump():
     coefficient = 1.366 * (0.03 / diameter) ** 0.45 * (3e-3 / diameter**3) ** 0.1 * froude**-0.6 * 5000.0**-0.21
     by_hand = 0.5 * rho * turn**3 * surface * (diameter / 2) ** 3 * coefficient
     assert power(5000.0) == pytest.approx(float(by_hand), rel=1e-6)
-    assert power(20_000.0, depth=1e-9) < 1e-3
+    assert power(20_000.0, depth=0.0) < 1e-3 * power(20_000.0)
 
 
 # derivatives
@@ -358,7 +359,9 @@ def test_derivatives_are_those_of_central_differences(of, forward):
     def along(leaves, ways, step):
         return jnp.sum(jnp.log(of(*jax.tree.unflatten(shape, [leaf + step * by for leaf, by in zip(leaves, ways)]))))
 
-    differentiate = jax.grad if not forward else lambda of, at: lambda *x: jax.jvp(partial(of, *x[:2]), x[2:], (1.0,))[1]
+    differentiate = (
+        jax.grad if not forward else lambda of, at: lambda *x: jax.jvp(partial(of, *x[:2]), x[2:], (1.0,))[1]
+    )
     program = jax.jit(lambda *x: (along(*x), differentiate(along, 2)(*x)))
     step = 1e-5
     (above, _), (_, slope), (below, _) = (program(leaves, ways, by) for by in (step, 0.0, -step))

@@ -8,6 +8,11 @@ from .table_keys import section_of
 from .tables import FILE, SettingsTable
 from .value_types import outside
 
+# that only a rating after ISO/TS 6336-20, -21 and -22 counts
+_OF_RATING = (
+    *("fzg_stage", "structure_factor", "run_in", "micropitting_test", "micropitting_test_film"),
+    *("pinion_immersion", "wheel_immersion", "splash_factor", "oil_volume"),
+)
 _SPEED = Number("rpm", low=0.0, open_low=True)
 
 
@@ -17,7 +22,11 @@ class LubricantSection(SettingsTable, section_of(Lubricant, open=False)):  # typ
     table = "lubricant"
 
     def check(self, design: DesignFile) -> None:
-        """Refuses a lubricant without motion, and its friction beside that of the load."""
+        """Refuses a lubricant without motion, its friction beside that of the load, and keys that rate nothing."""
+        if "rating" not in design.tables:
+            for name in _OF_RATING:
+                if getattr(self, name) is not None:
+                    raise DesignFileError(f"lubricant.{name}", "has no effect without [rating]")
         key, slowest = "load.speed", design.speed
         if slowest is None:
             raise DesignFileError("lubricant", "has no effect without load.speed")

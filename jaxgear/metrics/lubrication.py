@@ -133,7 +133,7 @@ def ohlendorf_loss_factor(pair: GearPair) -> Scalar:
     return loss_factor_at(pair.pinion.teeth, pair.gear_ratio, ratios, pair.pinion.base_helix_angle)
 
 
-def loss_factor_at(teeth: Given, gear_ratio: Given, tip_contact_ratios: tuple[Given, Given], base_helix: Given) -> Real:
+def loss_factor_at(teeth: Real, gear_ratio: Real, tip_contact_ratios: tuple[Real, Real], base_helix: Real) -> Real:
     """`ohlendorf_loss_factor` of the teeth of the pinion, u, the contact ratios eps_1, eps_2, and beta_b [rad]."""
     recess, approach = tip_contact_ratios
     share = 1 - (recess + approach) + recess**2 + approach**2
@@ -323,7 +323,7 @@ def film_thickness(cycle: MeshCycle, lubricant: Lubricant) -> Load:
 
 
 def film_between(
-    lubricant: Lubricant, radius: Given, rolling: Given, pressure: Given, modulus: Given, temperatures: tuple[Given, Given]
+    lubricant: Lubricant, radius: Real, rolling: Real, pressure: Real, modulus: Real, temperatures: tuple[Real, Real]
 ) -> Real:
     """The formula of `film_thickness` on its own [um].
 

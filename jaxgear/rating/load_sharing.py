@@ -23,7 +23,7 @@ _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(8)  # of the mean between two
 
 
 class MeshLoad(Checked):
-    """What loads and heats a mesh.
+    """Load and speed of a mesh, with what makes it heat.
 
     Attributes:
         torque: T_1 of the pinion; no load factor is in it.
@@ -54,7 +54,7 @@ class MeshLoad(Checked):
         return geometry.tangential_force(self.torque) / geometry.face_width * self.load_factors
 
     def effective_relief(self, geometry: MeshGeometry) -> Scalar:
-        """C_eff = K_A K_gamma F_bt / (b c_gamma_alpha), the relief that takes up the deflection [um]; ISO/TS 6336-20."""
+        """C_eff = K_A K_gamma F_bt / (b c_gamma_alpha) [um], relief that takes up the deflection (ISO/TS 6336-20)."""
         line_load = geometry.base_force(self.torque) / geometry.face_width
         return self.outer_factors * line_load / self.mesh_stiffness
 
@@ -70,8 +70,8 @@ def load_sharing(geometry: MeshGeometry, load: MeshLoad, path: Given) -> Real:
 
     Of spur gears (Q - 2) / 15, Q at least 7, at A and E, growing by 1/3 up to B and D, and 1 between them; of gears
     with a tip relief of C_eff growing from 0 to 1, and between the two linearly with the relief of that tip. Of helical
-    gears with an overlap ratio of 1 and more X_but / eps_alpha, where X_but rises to 1.3 towards A and E; below 1 linear
-    in the overlap ratio.
+    gears with an overlap ratio of 1 and more X_but / eps_alpha, where X_but rises to 1.3 towards A and E; below 1
+    linear in the overlap ratio.
     """
     start, inner, _, outer, end = geometry.path
     relieved = jnp.minimum(load.tip_relief / load.effective_relief(geometry), 1.0)

@@ -4,8 +4,8 @@ Losses count the torque itself, load factors do not heat. What gears lose withou
 depends on the housing as much as on the gears: estimates, of which two are here to be compared.
 
 References:
-    ISO/TR 14179-2 (G. Niemann, H. Winter, Maschinenelemente II, with the law of J. Mauz) for mesh loss and no-load loss;
-    C. Changenet, P. Velex, A model for the prediction of churning losses in geared transmissions, J. Mech. Des. 129
+    ISO/TR 14179-2 (G. Niemann, H. Winter, Maschinenelemente II, with the law of J. Mauz) for mesh and no-load loss; C.
+    Changenet, P. Velex, A model for the prediction of churning losses in geared transmissions, J. Mech. Des. 129
     (2007) 128-133.
 """
 
@@ -19,7 +19,7 @@ from .mesh_geometry import MeshGeometry, Real, Scalar
 
 _GRAVITY = 9.81  # m/s^2
 _LAMINAR, _TURBULENT = 6000.0, 9000.0  # Reynolds numbers between which the churning torque is linear
-_MOST_IMMERSED = 0.98  # of the diameter, to stay clear of where the wetted arc has no derivative
+_IMMERSED = 1e-6, 0.98  # of the diameter, to stay clear of where the wetted arc has no derivative
 
 
 def mesh_friction(geometry: MeshGeometry, load: MeshLoad, lubricant: Lubricant) -> Scalar:
@@ -52,7 +52,7 @@ def hydraulic_torque(width: Given, speed: Given, immersion: Given, splash: Given
         splash: C_Sp, 1 for spray lubrication; see `splash_factor`.
     """
     torque = 0.063 * immersion / 10 + 0.0128 * (width / 10) ** 3
-    return splash * torque * jnp.exp((immersion / 800 + 0.2) * speed / 10)
+    return real(splash * torque * jnp.exp((immersion / 800 + 0.2) * speed / 10))
 
 
 def splash_factor(deepest: Given, pitch_height: Given, hydraulic_length: Given) -> Real:
@@ -63,7 +63,7 @@ def splash_factor(deepest: Given, pitch_height: Given, hydraulic_length: Given) 
         pitch_height: h_C, of the pitch point above the lowest point of the gears in the oil [mm].
         hydraulic_length: l_h = 4 V / A of the wetted housing [mm].
     """
-    return real(4 * deepest / (3 * pitch_height)) ** 1.5 * 2 * pitch_height / hydraulic_length
+    return real((4 * deepest / (3 * pitch_height)) ** 1.5 * 2 * pitch_height / hydraulic_length)
 
 
 def churning_loss(
@@ -88,7 +88,7 @@ def churning_loss(
     diameter = 1e-3 * geometry.working_diameter[gear]
     width = 1e-3 * geometry.face_widths[gear]
     radius, turn = 0.5 * diameter, speed * geometry.teeth[0] / geometry.teeth[gear] * jnp.pi / 30
-    depth = jnp.minimum(1e-3 * immersion / diameter, _MOST_IMMERSED)
+    depth = jnp.clip(1e-3 * immersion / diameter, *_IMMERSED)
     fill = 1e-3 * volume / diameter**3
     density = lubricant.density_at(lubricant.temperature)
     reynolds = turn * radius**2 / (1e-6 * lubricant.kinematic_viscosity(lubricant.temperature))

@@ -116,7 +116,7 @@ def micropitting(
     along = jnp.pi * pressure**2 * radius / modulus  # line load of this pressure
     hot = bulk + flash_rise(friction, along, radius, modulus, speeds, tuple(geometry.thermal_contact_coefficient))
     loaded = jnp.maximum(pressure, _LEAST_PRESSURE)
-    film = film_between(lubricant, radius, sum(speeds), loaded, 2 * modulus, (bulk, hot))
+    film = film_between(lubricant, radius, speeds[0] + speeds[1], loaded, 2 * modulus, (bulk, hot))
     specific = film / lubricant.roughness
     permitted, least = permissible_film_thickness(lubricant, material_factors), jnp.min(specific)
     return Micropitting(
@@ -182,13 +182,16 @@ def film_of_test(lubricant: Lubricant, torque: Given) -> Scalar:
         lubricant: oil.
         torque: of the pinion at the failure stage [N m].
     """
-    stage = torque / _STAGE_TORQUE
+    stage = jnp.asarray(torque, lubricant.temperature.dtype) / _STAGE_TORQUE
     viscosity = 1e3 * lubricant.viscosity(jnp.full_like(lubricant.temperature, _TEST_OIL))
     friction = stage**0.2 * (viscosity / _STAGE_VISCOSITY) ** -0.05 * lubricant.slipperiness
     bulk = _TEST_OIL + (_STAGE_BULK - _TEST_OIL) * (stage * friction) ** 0.72
     hot = bulk + (_STAGE_CONTACT - _STAGE_BULK) * friction * stage**0.75
     pressure = jnp.sqrt(_STAGE_LOAD * stage * _TEST_MODULUS / (2 * jnp.pi * _TEST_RADIUS))
-    film = film_between(lubricant, _TEST_RADIUS, sum(_TEST_SPEEDS), pressure, _TEST_MODULUS, (bulk, hot))
+    radius, rolling, modulus = (
+        jnp.full_like(bulk, number) for number in (_TEST_RADIUS, sum(_TEST_SPEEDS), _TEST_MODULUS)
+    )
+    film = film_between(lubricant, radius, rolling, pressure, modulus, (bulk, hot))
     return film / _TEST_ROUGHNESS
 
 

@@ -1,8 +1,8 @@
 """Scuffing by the flash temperature and by the integral temperature.
 
 Both methods compare a temperature of the contact with one at which the oil of an FZG test failed. Radii of curvature
-are those of the transverse section, but that of friction at the pitch point, which is of the normal section. The contact analysis has temperatures of its own, `metrics.contact_temperature`, at
-its own line loads.
+are those of the transverse section, but that of friction at the pitch point, which is of the normal section. The
+contact analysis has temperatures of its own, `metrics.contact_temperature`, at its own line loads.
 
 References:
     ISO/TS 6336-20 (ISO/TR 13989-1), flash temperature; ISO/TS 6336-21 (ISO/TR 13989-2), integral temperature.

@@ -12,7 +12,7 @@ from .scuffing import FlashScuffing, IntegralScuffing, flash_scuffing, integral_
 
 
 class ThermalRating(Checked):
-    """What friction does to a mesh; NaN for what the lubricant does not tell enough of.
+    """Rating of a mesh by what friction does to it; NaN for what the lubricant does not tell enough of.
 
     Attributes:
         flash: scuffing by the flash temperature.
@@ -57,11 +57,9 @@ def rate_thermal(
         velocity = geometry.pitch_line_speed(load.speed)
         no_load = turn * hydraulic_torque(geometry.face_width, velocity, sum(dipped), lubricant.splash_factor)
         if lubricant.oil_volume is not None:
-            churned = sum(
-                churning_loss(geometry, gear, load.speed, depth, lubricant.oil_volume, lubricant)
-                for gear, depth in enumerate(depths)
-                if depth is not None
-            )
+            bath = lubricant.oil_volume, lubricant
+            of_gears = (churning_loss(geometry, gear, load.speed, depth, *bath) for gear, depth in enumerate(dipped))
+            churned = sum(of_gears, jnp.zeros_like(friction))
     return ThermalRating(
         flash=flash_scuffing(geometry, load, lubricant),
         integral=integral_scuffing(geometry, load, lubricant),
