@@ -21,12 +21,14 @@ def quantity_named(design: DesignFile, key: str, name: str) -> str | Quantity:
         DesignFileError: for an unknown name, and for one that needs a table or a key that the file does not have.
     """
     check_known(key, name, quantities)
-    quantity = quantities[name]
-    if quantity.takes is None:
+    every = quantities.every(name)
+    if every[0].takes is None:
         return name
-    missing = _missing(design, quantity)
-    if missing:
-        raise DesignFileError(key, f'"{quantity.name}" needs {missing}')
+    lacks = [_missing(design, each) for each in every]
+    if all(lacks):
+        raise DesignFileError(key, f'"{every[0].name}" needs {" or ".join(lacks)}')
+    quantity = every[lacks.index("")]
+    assert quantity.takes is not None
     settings = design.tables.get(quantity.takes.table)
     if isinstance(settings, FurtherTable):
         return settings.quantity(design, key, quantity)
@@ -35,11 +37,13 @@ def quantity_named(design: DesignFile, key: str, name: str) -> str | Quantity:
 
 def quantities_of_tables(design: DesignFile) -> Iterator[Quantity]:
     """All quantities of settings but those that solve further, as far as a design file tells what they need."""
-    for quantity in quantities.values():
+    for quantity in (each for name in quantities for each in quantities.every(name)):
         if quantity.takes is None or _missing(design, quantity):
             continue
         settings = design.tables.get(quantity.takes.table)
         if isinstance(settings, FurtherTable):
+            if quantity.name in settings.shown:
+                yield settings.quantity(design, settings.table, quantity)
             continue
         yield quantity if settings is None else quantity.with_settings(settings)
 

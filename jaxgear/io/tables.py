@@ -12,8 +12,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, ClassVar, Self
 
-from ..contact import OperatingPoint
-from ..metrics import Quantity
+from ..contact import MeshCycle, OperatingPoint
+from ..metrics import Finding, Quantity
 from ..numerics import Checked, Number
 from ..provided import provided
 from .errors import DesignFileError, join, referring
@@ -60,11 +60,13 @@ class FurtherTable(FileTable):
         drive_only: True if the table knows the drive flanks alone; a file with a negative torque is refused then.
         classified: True if its `quality_class` is that of the gears where these have one, and required elsewhere.
         direction: sense of rotation of the first shaft, where the table has such a key.
+        shown: names of the quantities of the table that every analysis of a design gives.
     """
 
     drive_only: ClassVar[bool] = False
     classified: ClassVar[bool] = False
     direction: str | None = None
+    shown: ClassVar[tuple[str, ...]] = ()
 
     @classmethod
     def read(cls, given: Mapping[str, Any], folder: Path) -> Self:
@@ -90,6 +92,15 @@ class FurtherTable(FileTable):
     def varies_along_face(self) -> list[str]:
         """Names of what makes the load vary along the face, which needs several slices; by default nothing."""
         return []
+
+    def findings(self, design: Any, cycle: MeshCycle) -> tuple[Finding, ...]:
+        """Findings about a solved design by the numbers of the table; by default none.
+
+        Args:
+            design: the `DesignFile`.
+            cycle: of a design with its flanks, under the design torque.
+        """
+        return ()
 
     def quantity(self, design: Any, key: str, quantity: Quantity) -> Quantity:
         """A quantity of the settings that the table stands for, with them.

@@ -211,6 +211,7 @@ class Vocabulary(Mapping[str, Quantity]):
             further: called at the first look-up, gives quantities to be added.
         """
         self._here: dict[str, Quantity] = {}
+        self._others: dict[str, list[Quantity]] = {}
         self._further: Callable[[], Iterable[Quantity]] | None = None
         self.add(*known)
         self._further = further
@@ -225,13 +226,21 @@ class Vocabulary(Mapping[str, Quantity]):
     def add(self, *quantities: Quantity) -> None:
         """Adds quantities.
 
+        A name that is taken may be that of another quantity too where both are of settings: which of them is meant is
+        then said by the settings, `every`.
+
         Raises:
             ValueError: for a name that is taken.
         """
         for quantity in quantities:
-            if quantity.name in self:
+            known = self.every(quantity.name)
+            taken = [each.takes for each in known]
+            if known and (None in taken or quantity.takes in (*taken, None)):
                 raise ValueError(f'quantities: "{quantity.name}" exists already')
-            self._here[quantity.name] = quantity
+            if known:
+                self._others.setdefault(quantity.name, []).append(quantity)
+            else:
+                self._here[quantity.name] = quantity
             if quantity.takes is not None:
                 _OF_SETTINGS.setdefault(quantity.takes, {})[quantity.name] = quantity
 
@@ -249,6 +258,11 @@ class Vocabulary(Mapping[str, Quantity]):
 
     def __len__(self) -> int:
         return len(self._known)
+
+    def every(self, name: object) -> tuple[Quantity, ...]:
+        """The quantities of a name in either spelling, by different settings; none for an unknown one."""
+        found = self._find(name)
+        return () if found is None else (found, *self._others.get(found.name, ()))
 
     def not_known(self, name: object) -> str:
         """That a name is not known, with the nearest known one."""

@@ -16,6 +16,7 @@ References:
 
 from typing import NamedTuple
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
@@ -114,7 +115,7 @@ Load = Float[Array, "pairs slices positions"]
 
 _TANGENT = jnp.pi / 6  # of the critical section, against the centreline [rad]
 _SECTION_STEPS = 8  # fixed-point steps of ISO 6336-3 for theta; it gains two digits per step
-_NOTCH_LIMITS = (1.0, 8.0)  # validity of Y_S in the notch parameter q_s
+NOTCH_LIMITS = (1.0, 8.0)  # validity of Y_S in the notch parameter q_s
 _OBLIQUE, _MOST_OBLIQUE = 120.0, 30.0  # deg; Y_beta = 1 - eps_beta beta / 120 deg, beta at most 30 deg
 # Contacts near the root load the section with almost no lever arm; the formula needs a positive one [x module].
 _SHORTEST_ARM = 0.05
@@ -135,11 +136,24 @@ class CriticalSection(Checked):
 
 
 class RootFactors(Checked):
-    """Form factor Y_F and stress correction factor Y_S at given load points."""
+    """Form factor Y_F and stress correction factor Y_S at given load points, and what they are made of.
+
+    Attributes:
+        form, correction: Y_F, Y_S.
+        lever_arm: h_Fe.
+        load_angle: alpha_Fen [rad].
+        load_diameter: d_en, of helical gears that of the virtual gear.
+        notch: q_s, before it is limited to the validity of Y_S.
+        section: at the 30 degree tangent.
+    """
 
     form: Real = result()
     correction: Real = result()
     lever_arm: Real = result("mm")
+    load_angle: Real = result("rad")
+    load_diameter: Real = result("mm")
+    notch: Real = result()
+    section: CriticalSection = eqx.field()
 
 
 class RootStress(Checked):
@@ -207,15 +221,16 @@ def root_factors(gear: Gear, roll_length: Real) -> RootFactors:
         radius = jnp.hypot(gear.base_radius, roll_length) - gear.pitch_radius + virtual.pitch_radius
         gear, roll_length = virtual, safe_sqrt(radius**2 - virtual.base_radius**2)
     section, m = critical_section(gear), gear.module
-    cosine = jnp.cos(load_angle(gear, roll_length))
+    angle = load_angle(gear, roll_length)
+    cosine = jnp.cos(angle)
     # the lever arm ends where the load line crosses the tooth centreline
     arm = jnp.maximum(gear.base_radius / cosine - section.depth, _SHORTEST_ARM * m)
     alpha = jnp.deg2rad(gear.pressure_angle)
     form = 6 * (arm / m) * cosine / ((section.chord / m) ** 2 * jnp.cos(alpha))
     slenderness = section.chord / arm
-    notch = jnp.clip(section.chord / (2 * section.fillet_radius), *_NOTCH_LIMITS)
-    correction = (1.2 + 0.13 * slenderness) * notch ** (1 / (1.21 + 2.3 / slenderness))
-    return RootFactors(form, correction, arm)
+    notch = section.chord / (2 * section.fillet_radius)
+    correction = (1.2 + 0.13 * slenderness) * jnp.clip(notch, *NOTCH_LIMITS) ** (1 / (1.21 + 2.3 / slenderness))
+    return RootFactors(form, correction, arm, angle, 2 * jnp.hypot(gear.base_radius, roll_length), notch, section)
 
 
 def root_stress_per_load(gear: Gear, roll_length: Real) -> Real:

@@ -7,7 +7,7 @@ References:
 """
 
 from collections.abc import Mapping
-from typing import Literal, NamedTuple, get_args
+from typing import Any, Literal, NamedTuple, get_args
 
 HeatTreatment = Literal[
     "normalized",
@@ -39,6 +39,8 @@ class Kind(NamedTuple):
         flank, root: knees of the S-N lines up to the endurance limit.
         running_in: "hard" for surface-hardened flanks, "soft" for others of steel, "cast" for grey iron.
         notch: (strength [MPa], slip layer thickness rho' [mm]) by yield strength; one row for any.
+        static_notch: Y_deltarelT of static strength: a + b Y_S; or, by the yield strength sigma_S, (1 + c (Y_S - 1)) /
+            (1 + c) with c = a (b / sigma_S)^0.25, where the third says so.
         surface: a, b, e, most of Y_RrelT = a - b (R_z + 1)^e, at most `most`.
         size: a, b, least of Y_X = a - b m_n from 5 mm on, at least `least`.
         mean_stress: M of Y_M, fatigue: a - b Y_S.
@@ -50,6 +52,7 @@ class Kind(NamedTuple):
     root: Knees
     running_in: Literal["hard", "soft", "cast"]
     notch: Knees
+    static_notch: tuple[float, float, bool]
     surface: tuple[float, float, float, float]
     size: tuple[float, float, float]
     mean_stress: tuple[float, float]
@@ -60,6 +63,7 @@ class Kind(NamedTuple):
 _LIFE = (1e5, 1.6), (5e7, 1.0)
 _SHORT_LIFE = (1e5, 1.3), (2e6, 1.0)
 PITTING_PERMITTED: Knees = (6e5, 1.6), (1e7, 1.3), (1e9, 1.0)  # in place of _LIFE
+LONG_LIFE = 1e10  # cycles, at which S-N lines end
 _ROOT_SOFT, _ROOT_HARD, _ROOT_SHORT = (
     ((1e4, 2.5), (3e6, 1.0)),
     ((1e3, 2.5), (3e6, 1.0)),
@@ -77,12 +81,52 @@ _NOTCH_IRON = ((300.0, 0.3095),)
 _NOTCH_GREY = (150.0, 0.3124), (300.0, 0.3095)
 _NOTCH_HARD, _NOTCH_NITRIDED = ((0.0, 0.0030),), ((0.0, 0.1005),)
 
-_STEEL = Kind(_LIFE, _ROOT_SOFT, "soft", _NOTCH_STEEL, _OF_STEEL, _SIZE_SOFT, (0.3, 0.0), (0.5, 0.0), False)
-_SOFT = _STEEL._replace(notch=_NOTCH_SOFT, surface=_OF_SOFT)
-_CAST = _SOFT._replace(mean_stress=(0.4, 0.0), static_mean_stress=(0.6, 0.0))
-_FERRITIC = Kind(_SHORT_LIFE, _ROOT_SHORT, "cast", _NOTCH_IRON, _OF_IRON, _SIZE_IRON, (0.4, 0.0), (0.6, 0.0), False)
-_HARD = Kind(_LIFE, _ROOT_HARD, "hard", _NOTCH_HARD, _OF_SOFT, _SIZE_HARD, (0.8, 0.15), (0.7, 0.0), True)
-_NITRIDED = Kind(_SHORT_LIFE, _ROOT_SHORT, "hard", _NOTCH_NITRIDED, _OF_IRON, _SIZE_HARD, (0.3, 0.0), (0.4, 0.0), True)
+_STEEL = Kind(
+    flank=_LIFE,
+    root=_ROOT_SOFT,
+    running_in="soft",
+    notch=_NOTCH_STEEL,
+    static_notch=(0.93, 200.0, True),
+    surface=_OF_STEEL,
+    size=_SIZE_SOFT,
+    mean_stress=(0.3, 0.0),
+    static_mean_stress=(0.5, 0.0),
+    hardened=False,
+)
+_AS_CAST: dict[str, Any] = {"mean_stress": (0.4, 0.0), "static_mean_stress": (0.6, 0.0)}
+_CAST_STEEL = _STEEL._replace(static_notch=(0.86, 0.07, False), **_AS_CAST)
+_SOFT = _STEEL._replace(notch=_NOTCH_SOFT, static_notch=(0.82, 300.0, True), surface=_OF_SOFT)
+_CAST = _SOFT._replace(**_AS_CAST)
+_FERRITIC = _CAST._replace(
+    flank=_SHORT_LIFE,
+    root=_ROOT_SHORT,
+    running_in="cast",
+    notch=_NOTCH_IRON,
+    static_notch=(1.0, 0.0, False),
+    surface=_OF_IRON,
+    size=_SIZE_IRON,
+)
+_HARD = Kind(
+    flank=_LIFE,
+    root=_ROOT_HARD,
+    running_in="hard",
+    notch=_NOTCH_HARD,
+    static_notch=(0.12, 0.44, False),
+    surface=_OF_SOFT,
+    size=_SIZE_HARD,
+    mean_stress=(0.8, 0.15),
+    static_mean_stress=(0.7, 0.0),
+    hardened=True,
+)
+_NITRIDED = _HARD._replace(
+    flank=_SHORT_LIFE,
+    root=_ROOT_SHORT,
+    notch=_NOTCH_NITRIDED,
+    static_notch=(0.6, 0.2, False),
+    surface=_OF_IRON,
+    mean_stress=(0.3, 0.0),
+    static_mean_stress=(0.4, 0.0),
+)
 
 
 class Limit(NamedTuple):
@@ -127,7 +171,7 @@ GROUPS: Mapping[str, Group] = {
     ),
     "cast_steel": _group(
         "HBW", [(140, 210)], [(0.986, 131), (1.143, 237)], [(0.313, 62), (0.254, 137)],
-        _STEEL._replace(mean_stress=(0.4, 0.0), static_mean_stress=(0.6, 0.0)),
+        _CAST_STEEL,
     ),
     "black_malleable_iron": _group(
         "HBW", [(135, 250), (175, 250)], [(1.371, 143), (1.333, 267)], [(0.345, 77), (0.403, 128)], _CAST
@@ -163,7 +207,7 @@ GROUPS: Mapping[str, Group] = {
     "induction_hardened": _group(
         "HV", [(485, 615), (500, 615), (500, 615)], [(0.74, 602), (0.541, 882), (0.505, 1013)],
         [(0.305, 76), (0.138, 290, 369), (0.271, 237)],
-        _HARD._replace(mean_stress=(0.4, 0.0), static_mean_stress=(0.6, 0.0)),
+        _HARD._replace(**_AS_CAST),
     ),
     "gas_nitrided": _group(
         "HV", [(650, 900)], [(0, 1125), (0, 1250), (0, 1450)], [(0, 270), (0, 420), (0, 468)], _NITRIDED

@@ -7,8 +7,9 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..conditions import LoadSpectrum
+from ..geometry import Gear, GearPair, Material
 from ..metrics import AbstractSettings, Lubricant
-from ..numerics import Checked, concrete, count, number
+from ..numerics import Checked, changed, concrete, count, number
 from .materials import GROUPS, QUALITIES, Group, HeatTreatment, MaterialQuality
 
 Scalar = Float[Array, ""]
@@ -16,6 +17,7 @@ Edition = Literal["2006", "2019"]
 RootProfileShift = Literal["upper", "mean", "nominal"]
 ProfileModification = Literal["none", "suitable", "optimal"]
 
+_LEAST_MODULUS = 50_000.0  # [MPa], of metals
 _CORE_HARDNESS = 25.0, 30.0  # [HRC], least, and from which case-hardened MQ bears more
 _RZ_PER_RA = 6.0
 _CORE_BENDING = 500.0  # sigma_Flim then [MPa]
@@ -141,8 +143,9 @@ class GearRating(Checked):
 
     def _of_group(self, limits) -> Scalar:
         slope, offset, most = limits[self._quality]
-        hardness = jnp.zeros(()) if self.hardness is None else self.hardness
-        return jnp.minimum(slope * hardness + offset, most)
+        if self.hardness is None:
+            return jnp.full_like(self.contacts_per_revolution, offset)
+        return jnp.minimum(slope * self.hardness + offset, most)
 
     @property
     def flank_roughness(self) -> tuple[Scalar, Scalar]:
@@ -216,3 +219,31 @@ class Rating(AbstractSettings):
     def gears(self) -> tuple[GearRating, GearRating]:
         """Pinion and wheel."""
         return self.pinion, self.wheel
+
+
+def check_metal(name: str, material: Material) -> None:
+    """Refuses gears that are not of metal.
+
+    Raises:
+        ValueError: for an elastic modulus of plastics, in one line.
+    """
+    known = concrete(material.elastic_modulus)
+    if known is not None and (known < _LEAST_MODULUS).any():
+        given = f"{name} = {float(known.min()):g} MPa must be at least {_LEAST_MODULUS:g} MPa"
+        raise ValueError(f"{given}: ISO 6336 rates gears of metal, those of plastics are for VDI 2736")
+
+
+def rated_pair(pair: GearPair, rating: Rating) -> GearPair:
+    """The pair with the tooth thickness by which its roots are rated, for root stress and single stiffness."""
+    pinion, wheel = (_rated(gear, rating) for gear in pair.gears)
+    return changed(pair, pinion=pinion, wheel=wheel)
+
+
+def _rated(gear: Gear, rating: Rating) -> Gear:
+    if rating.root_profile_shift == "mean":
+        return gear
+    none = jnp.zeros_like(gear.module)
+    if rating.root_profile_shift == "upper":
+        return changed(gear, tooth_thickness_tolerance=none)
+    stock = None if gear.grinding_allowance is None else none
+    return changed(gear, tooth_thickness_allowance=none, tooth_thickness_tolerance=none, grinding_allowance=stock)

@@ -12,6 +12,7 @@ from ..contact import Mesh, MeshCycle, OperatingPoint, Resolution
 from ..contact.mesh import fewer_slices, half_way, slices_left
 from ..contact.status import Status, reason
 from ..io import DesignFile, quantities_of_tables
+from ..io.tables import FurtherTable
 from ..metrics import (
     AbstractSettings,
     Analysis,
@@ -96,10 +97,11 @@ def evaluation_of(
     curves = np.asarray([cycle.transmission_error for cycle in cycles])
     infinite = Status.NOT_CONVERGED * ~np.isfinite(curves).all(axis=1)
     status = np.maximum([np.asarray(cycle.status).max() for cycle in cycles], infinite)
-    # without the flanks: one program serves every kind of them
     running = OperatingPoint(real(file.torque), optional_real(file.speed), optional_real(file.friction))
-    bare = replace(cycles[0], pinion=None, wheel=None, operating_point=running)
     further, settings = share_settings(tuple(quantities_of_tables(file)))
+    bare = replace(cycles[0], operating_point=running)
+    if not any(isinstance(each, FurtherTable) and each.shown for each in file.tables.values()):
+        bare = replace(bare, pinion=None, wheel=None)  # one program serves every kind of flank
     metrics, factors = jax.tree.map(lambda value: np.asarray(value).item(), _numbers(bare, further, settings))
     return Evaluation(
         pinion=pinion,

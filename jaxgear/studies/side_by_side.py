@@ -10,6 +10,7 @@ from jaxtyping import Array, Float
 from ..contact import Mesh
 from ..io import DesignFile, describe
 from ..io.results import unit_of
+from ..io.tables import FurtherTable
 from ..io.tolerance_table import quality_classes
 from ..metrics import Finding, Quantity, findings_of
 from ..microgeometry import AbstractModification
@@ -80,6 +81,8 @@ def findings(file: DesignFile, mesh: Mesh, evaluations: Evaluations) -> dict[str
             options["support_deflection"] = float(_support_deflection(mesh, design.cycle.line_load))
         options["verified"] = design.verified and design.verified.ppte
         found[name] = findings_of(design.cycle, **options)
+        for given in (each for each in file.tables.values() if isinstance(each, FurtherTable)):
+            found[name] += given.findings(file, design.cycle)
     return found
 
 

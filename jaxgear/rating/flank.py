@@ -1,0 +1,192 @@
+"""Surface durability (pitting) of ISO 6336-2.
+
+References:
+    ISO 6336-2:2006 with its corrigendum of 2008 (Z_beta), and 2019.
+"""
+
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from ..compliance.plane import combined_modulus
+from ..geometry import GearPair
+from ..numerics import Checked, Given, result
+from .life import SNLine, life_factor, strength_line
+from .materials import PITTING_PERMITTED, Knees
+from .mesh_geometry import MeshGeometry
+from .settings import GearRating, Rating
+
+Scalar = Float[Array, ""]
+OfGears = Float[Array, " gears"]
+
+# sigma_Hlim [MPa] between which C_ZL and C_ZR change, and their values
+_LIMITS = 850.0, 1200.0
+_LUBRICANT = 0.83, 0.91
+_ROUGHNESS = 0.15, 0.08
+_VELOCITY_ABOVE = 0.02  # C_Zv - C_ZL
+_SMOOTH = 3.0  # R_z10 and R_zH of a factor of 1 [um]
+_REFERENCE_RADIUS = 10.0  # [mm]
+_HARDEST_ROUGHNESS = 6.0  # R_z of a hard flank [um], up to which it hardens its mate
+_WORK_HARDENING = 130.0, 470.0  # [HBW]
+_ROUGHEST = 16.0  # R_zH [um]
+# both through-hardened: (HB1 / HB2, slope over u - 1)
+_HARDNESS_RATIOS = 1.2, 1.7
+_MOST_RATIO, _MOST_SLOPE = 20.0, 0.00698
+_PERMITTING = 5e7  # cycles of the endurance limit of materials that bear some pitting
+# f_ZCa of 2019, by the modification of the profile
+_MODIFIED = {"none": 1.2, "suitable": 1.07, "optimal": 1.0}
+
+
+class FlankFactors(Checked):
+    """Factors of ISO 6336-2; of both gears where they differ.
+
+    Attributes:
+        zone, elasticity, contact_ratio, helix_angle: Z_H, Z_E, Z_eps, Z_beta.
+        single_pair: Z_B and Z_D.
+        lubricant, velocity, roughness: Z_L, Z_v, Z_R.
+        mean_roughness: R_z10.
+        work_hardening, static_work_hardening: Z_W.
+        size: Z_X, 1.
+    """
+
+    zone: Scalar = result()
+    elasticity: Scalar = result("MPa^0.5")
+    contact_ratio: Scalar = result()
+    helix_angle: Scalar = result()
+    single_pair: OfGears = result()
+    lubricant: Scalar = result()
+    velocity: Scalar = result()
+    roughness: Scalar = result()
+    mean_roughness: Scalar = result("um")
+    work_hardening: OfGears = result()
+    static_work_hardening: OfGears = result()
+    size: OfGears = result()
+
+    def nominal_stress(self, geometry: MeshGeometry, torque: Given) -> Scalar:
+        """sigma_H0 = Z_H Z_E Z_eps Z_beta sqrt(F_t / (d_1 b) (u + 1) / u) [MPa] of a torque on the pinion [N m]."""
+        load = geometry.tangential_force(torque) / (geometry.reference_diameter[0] * geometry.face_width)
+        product = self.zone * self.elasticity * self.contact_ratio * self.helix_angle
+        return product * jnp.sqrt(load * (1 + 1 / geometry.gear_ratio))
+
+    @property
+    def reference(self) -> OfGears:
+        """Z_L Z_v Z_R Z_W Z_X of both gears."""
+        return self.lubricant * self.velocity * self.roughness * self.work_hardening * self.size
+
+
+def flank_factors(pair: GearPair, geometry: MeshGeometry, speed: Given, rating: Rating) -> FlankFactors:
+    """Factors of the contact stress and of its permissible value, at a speed of the pinion [rpm].
+
+    Raises:
+        ValueError: for a rating without lubricant, and for gears without roughness or, where Z_W needs it, hardness.
+    """
+    oil = rating.lubricant
+    if oil is None:
+        raise ValueError("Z_L needs the lubricant, its viscosity at 40 degC")
+    working, transverse = geometry.working_pressure_angle, geometry.transverse_pressure_angle
+    overlap = jnp.minimum(geometry.overlap_ratio, 1.0)
+    cosine = jnp.cos(geometry.helix_angle)
+    softer = jnp.minimum(*(gear.pitting_strength for gear in rating.gears))
+    way = jnp.clip((softer - _LIMITS[0]) / (_LIMITS[1] - _LIMITS[0]), 0.0, 1.0)
+    on_film, on_roughness = (low + (high - low) * way for low, high in (_LUBRICANT, _ROUGHNESS))
+    on_speed = on_film + _VELOCITY_ABOVE
+    velocity = geometry.reference_speed(speed)
+    radius = geometry.reduced_radius(jnp.zeros_like(working))
+    first, second = (gear.flank_roughness[0] for gear in rating.gears)
+    relative = 0.5 * (first + second) * (_REFERENCE_RADIUS / radius) ** (1 / 3)
+    hardening = [_work_hardening(of, geometry, rating, radius, velocity) for of in (0, 1)]
+    return FlankFactors(
+        zone=jnp.sqrt(2 * jnp.cos(geometry.base_helix_angle) / (jnp.cos(transverse) ** 2 * jnp.tan(working))),
+        elasticity=jnp.sqrt(combined_modulus(pair.pinion.material, pair.wheel.material, "strain") / jnp.pi),
+        contact_ratio=jnp.sqrt(
+            jnp.maximum(4 - geometry.contact_ratio, 0.0) / 3 * (1 - overlap) + overlap / geometry.contact_ratio
+        ),
+        helix_angle=1 / jnp.sqrt(cosine),
+        single_pair=_single_pair_factors(geometry, rating, overlap),
+        lubricant=on_film + 4 * (1 - on_film) / (1.2 + 134 / oil.viscosity_40) ** 2,
+        velocity=on_speed + 2 * (1 - on_speed) / jnp.sqrt(0.8 + 32 / velocity),
+        roughness=(_SMOOTH / relative) ** on_roughness,
+        mean_roughness=relative,
+        work_hardening=jnp.stack([hardened for hardened, _ in hardening]),
+        static_work_hardening=jnp.stack([static for _, static in hardening]),
+        size=jnp.ones_like(geometry.teeth),
+    )
+
+
+def _single_pair_factors(geometry: MeshGeometry, rating: Rating, overlap: Scalar) -> OfGears:
+    """Z_B and Z_D: from the pitch point to the inner points of single contact; linear in the overlap ratio to 1 or, in
+    2019, to sqrt(f_ZCa)."""
+    inner, outer = geometry.path[1], geometry.path[3]
+    at_pitch = geometry.reduced_radius(jnp.zeros_like(inner))
+    spur = jnp.sqrt(at_pitch / geometry.reduced_radius(jnp.stack([inner, outer])))
+    helical = 1.0 if rating.edition == "2006" else _MODIFIED[rating.profile_modification] ** 0.5
+    return jnp.maximum(spur - overlap * (spur - helical), 1.0)
+
+
+def _work_hardening(
+    of: int, geometry: MeshGeometry, rating: Rating, radius: Scalar, velocity: Scalar
+) -> tuple[Scalar, Scalar]:
+    """Z_W of one gear for endurance and static strength: more than 1 of the softer one of a pair."""
+    gear, mate, one = rating.gears[of], rating.gears[1 - of], jnp.ones_like(radius)
+    if gear.group.kind.hardened or gear.group.kind.running_in == "cast":
+        return one, one
+    if mate.group.kind.hardened:
+        hardness = jnp.clip(_hardness(gear), *_WORK_HARDENING) - _WORK_HARDENING[0]
+        assert rating.lubricant is not None
+        hard, soft = mate.flank_roughness[0], gear.flank_roughness[0]
+        film = (rating.lubricant.viscosity_40 * velocity / 1500) ** -0.33
+        roughness = hard * (_REFERENCE_RADIUS / radius) ** 0.33 * (hard / soft) ** 0.66 * film
+        factor = (1.2 - hardness / 1700) * (_SMOOTH / jnp.clip(roughness, _SMOOTH, _ROUGHEST)) ** 0.15
+        smooth = hard <= _HARDEST_ROUGHNESS
+        return jnp.where(smooth, factor, 1.0), jnp.where(smooth, 1.05 - hardness / 6800, 1.0)
+    if gear.hardness is None or mate.hardness is None:
+        return one, one  # of limits that are given as such, no hardness is known that could add to them
+    ratio = mate.hardness / gear.hardness
+    low, high = _HARDNESS_RATIOS
+    slope = jnp.where(ratio < low, 0.0, jnp.where(ratio > high, _MOST_SLOPE, 0.00898 * ratio - 0.00829))
+    larger = jnp.maximum(geometry.gear_ratio, 1 / geometry.gear_ratio)
+    return 1 + slope * (jnp.minimum(larger, _MOST_RATIO) - 1), one
+
+
+def _hardness(gear: GearRating) -> Scalar:
+    if gear.hardness is None:
+        raise ValueError("Z_W needs the hardness of the softer gear [HBW]")
+    return gear.hardness
+
+
+def flank_knees(gear: GearRating, rating: Rating) -> Knees:
+    """Load cycles and life factors Z_NT of a gear.
+
+    Raises:
+        ValueError: where pitting is permitted on a material that bears none.
+    """
+    knees = gear.group.kind.flank
+    if not rating.pitting_permitted:
+        return knees
+    if knees[-1][0] < _PERMITTING:
+        raise ValueError(f"pitting_permitted has no S-N line for {gear.heat_treatment} gears")
+    return PITTING_PERMITTED
+
+
+def flank_lines(factors: FlankFactors, rating: Rating) -> tuple[SNLine, SNLine]:
+    """S-N lines of pinion and wheel for the contact stress."""
+    pinion, wheel = (
+        strength_line(
+            gear.pitting_strength,
+            flank_knees(gear, rating),
+            factors.reference[of],
+            factors.static_work_hardening[of],
+            rating.long_life_factor,
+        )
+        for of, gear in enumerate(rating.gears)
+    )
+    return pinion, wheel
+
+
+def flank_life_factors(rating: Rating, cycles: OfGears) -> OfGears:
+    """Z_NT of both gears at their load cycles."""
+    return jnp.stack(
+        [
+            life_factor(flank_knees(gear, rating), cycles[of], rating.long_life_factor)
+            for of, gear in enumerate(rating.gears)
+        ]
+    )
