@@ -21,7 +21,8 @@ import equinox as eqx  # noqa: E402
 import jax.numpy as jnp  # noqa: E402
 
 import jaxgear as jg  # noqa: E402
-from jaxgear import manufacture  # noqa: E402
+from jaxgear import manufacture, tolerance  # noqa: E402
+from jaxgear.manufacture import figures  # noqa: E402
 
 TORQUE = 200.0  # N m
 LARGEST = 6.0  # um, the study's limit of the relief
@@ -111,7 +112,7 @@ def numbers(results):
             )
             found[f"{key}_ground_ppte_{degree}_um"] = ground[degree]
         found[f"{key}_ppte_um"] = designed
-        found[f"{key}_node_diameter_mm"] = float(manufacture.flank_place(side, wheels[2][0].node_roll_length).diameter)
+        found[f"{key}_node_diameter_mm"] = float(tolerance.flank_place(side, wheels[2][0].node_roll_length).diameter)
         volume = float(manufacture.ground_volume(side, best.pinion))
         found[f"{key}_volume_mm3"] = volume
         found[f"{key}_linear_volume_ratio"] = float(references.linear_from_pitch) / volume
@@ -131,16 +132,16 @@ def draw(results):
     mesh, designs = results
     side = mesh.sides[0]
     wheels = {f"{name}, parabola": wheels[2][0] for name, (_, _, wheels, _) in designs.items()}
-    plot.save(plot.wheel_deviation(wheels, limit=WITHIN).figure, "results/can_it_be_ground_deviation.png")
+    plot.save(figures.wheel_deviation(wheels, limit=WITHIN).figure, "results/can_it_be_ground_deviation.png")
     flank = designs["curve"][0].pinion
-    plot.save(plot.tooth_space(side, flank).figure, "results/can_it_be_ground_wheel.png")
+    plot.save(figures.tooth_space(side, flank).figure, "results/can_it_be_ground_wheel.png")
     references = manufacture.reference_volumes(side, LARGEST)
     volumes = {
         "linear from the pitch point, 6 µm": references.linear_from_pitch,
         "parabolic from the pitch point, 6 µm": references.parabolic_from_pitch,
     }
     volumes |= {name: manufacture.ground_volume(side, best.pinion) for name, (best, *_) in designs.items()}
-    plot.save(plot.volumes(volumes).figure, "results/can_it_be_ground_volumes.png")
+    plot.save(figures.volumes(volumes).figure, "results/can_it_be_ground_volumes.png")
 
 
 if __name__ == "__main__":

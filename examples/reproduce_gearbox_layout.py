@@ -26,6 +26,7 @@ import numpy as np  # noqa: E402
 
 import jaxgear as jg  # noqa: E402
 from jaxgear import layout, plot, shafts  # noqa: E402
+from jaxgear.layout import figures  # noqa: E402
 
 TORQUE = 1300.0  # N m, on the first pinion
 CLASS = 5  # ISO 1328-1
@@ -161,7 +162,7 @@ def draw(found):
     folder = Path("results")
     lines = found["lines"]["low speed", "bad foundation"][1]
     for step, cases in enumerate((lines.before, lines.after), 1):
-        axes = layout.tolerance_line_load(cases["maximum"], title=f"low speed, step {step}")
+        axes = figures.tolerance_line_load(cases["maximum"], title=f"low speed, step {step}")
         plot.save(np.ravel(axes)[0].figure, folder / f"reproduce_gearbox_layout_step_{step}.png")
     made = found["profiles"]["low speed", "bad foundation"]
     rows, names = made.radar_variants()

@@ -27,11 +27,7 @@ import jax.numpy as jnp  # noqa: E402
 import numpy as np  # noqa: E402
 
 import jaxgear as jg  # noqa: E402
-from jaxgear import (  # noqa: E402
-    dimensionless,  # noqa: E402
-    dynamics,
-    manufacture,
-)
+from jaxgear import dimensionless, dynamics, tolerance  # noqa: E402
 from jaxgear.io import load_design  # noqa: E402
 
 FILE = Path(__file__).parent / "dynamics_50_50.toml"
@@ -129,7 +125,7 @@ def study(fast=False) -> dict:
 def trace(results, name):
     """Step 5: the flank of the dynamic optimum, material removed [um] over roll angle [deg]."""
     side, flank = results["mesh"].sides[0], results["speeds"][name]["flanks"]["dynamic"]
-    drawn = manufacture.profile_trace(side, flank, points=12)
+    drawn = tolerance.profile_trace(side, flank, points=12)
     return np.asarray(drawn.roll_angle), -np.asarray(drawn.design)
 
 

@@ -15,12 +15,11 @@ The pipeline in reading order, every step differentiable and vmappable:
     dynamics                    mesh force, oscillators, steady states over the speed, orbits and their bifurcations
     wear                        the flanks over their life, worn by their own contact
     shafts                      shafts, bearings, housing: the load over the face
-    manufacture                 grinding wheel, volumes ground off, measuring charts
 
 The rest lives in the namespaces `jaxgear.geometry`, `compliance`, `contact`, `tolerance`, `conditions`, `metrics`,
-`revolution`, `sizing`, `sweeps`, `optimize`, `dynamics`, `wear`, `shafts`, `manufacture`, `studies`, `plot` and `io`,
+`revolution`, `sizing`, `sweeps`, `optimize`, `dynamics`, `wear`, `shafts`, `studies`, `plot` and `io`,
 with their `Abstract...` classes as extension points. Applications that none of these knows, such as `jaxgear.layout`,
-`jaxgear.identification` and `jaxgear.rexs`, are imported by name; see `jaxgear.provided`.
+`jaxgear.manufacture`, `jaxgear.identification` and `jaxgear.rexs`, are imported by name; see `jaxgear.provided`.
 
 Units: mm for geometry, um for modifications and transmission error, N, N m (on the pinion), MPa, degrees in
 constructors.

@@ -6,7 +6,6 @@ from . import contact as contact
 from . import dynamics as dynamics
 from . import geometry as geometry
 from . import io as io
-from . import manufacture as manufacture
 from . import metrics as metrics
 from . import microgeometry as microgeometry
 from . import numerics as numerics

@@ -31,7 +31,6 @@ ORDER = (
     "dynamics",
     "dimensionless",
     "wear",
-    "manufacture",
     "vocabulary",
     "sizing",
     "sweeps",
@@ -44,6 +43,7 @@ ORDER = (
     "rating",
     "identification",
     "layout",
+    "manufacture",
     "rexs",
 )
 FILES = sorted(PACKAGE.rglob("*.py"))
@@ -196,7 +196,7 @@ OF_ANY_TYPE = {
     "sweeps/table.py SweepTable.to_arrow": "likewise",
     "sweeps/table.py SweepTable.to_pandas": "likewise",
     "sweeps/table.py SweepTable.to_xarray": "likewise",
-    "manufacture/drawn_gear.py drawn_gear": "takes the arguments of two classes, each of a type of its own",
+    "geometry/drawing.py drawn_gear": "takes the arguments of two classes, each of a type of its own",
     "numerics/fields.py count": "stands for the value of a field, whose annotation says the type",
     "numerics/fields.py number": "likewise",
     "numerics/fields.py result": "likewise",

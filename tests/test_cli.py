@@ -28,9 +28,9 @@ import jaxgear as jg
 from jaxgear import plot
 from jaxgear.cli import cache, main, run
 from jaxgear.contact.status import Status
+from jaxgear.geometry import over_balls
 from jaxgear.io import Search, first_look, load_design
 from jaxgear.io.folder import result_folder
-from jaxgear.manufacture import over_balls
 from jaxgear.metrics import Finding
 from jaxgear.microgeometry import NoModification
 from jaxgear.numerics import Usual

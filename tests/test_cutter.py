@@ -10,10 +10,9 @@ from design_texts import loaded, text
 import jaxgear as jg
 from jaxgear.compliance.finite_element.compliance_table import shape_of
 from jaxgear.compliance.finite_element.shape import Shape, Tooth
-from jaxgear.geometry import outline
+from jaxgear.geometry import drawn_gear, outline
 from jaxgear.geometry.cutter import full_rounding, rolling
 from jaxgear.io import DesignFileError
-from jaxgear.manufacture import drawn_gear
 from jaxgear.metrics.stress import critical_section
 from jaxgear.rexs import write_rexs
 

@@ -14,11 +14,10 @@ from jaxgear.compliance.assembly import with_edge
 from jaxgear.compliance.edge import _wedge_excess
 from jaxgear.compliance.hertz import contact_geometry
 from jaxgear.compliance.tooth import tooth_load
-from jaxgear.geometry import outline, pair_with_backlash
+from jaxgear.geometry import drawn_gear, outline, over_balls, pair_with_backlash, span
 from jaxgear.geometry.involute import half_tooth_angle
 from jaxgear.io import DesignFileError, load_design
 from jaxgear.io.tolerance_table import quality_classes
-from jaxgear.manufacture import drawn_gear, over_balls, span
 
 PINION = {"teeth": 19, "module": 3.0, "face_width": 20.0, "profile_shift": 0.1}
 COSINE = np.cos(np.deg2rad(20.0))

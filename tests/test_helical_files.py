@@ -12,9 +12,9 @@ from helical_pairs import pair_of
 
 import jaxgear as jg
 from jaxgear.contact import helical_slices
+from jaxgear.geometry import span
 from jaxgear.io import DesignFileError, load_design, write_design
 from jaxgear.io.write_design import write_starter
-from jaxgear.manufacture import span
 from jaxgear.rexs import read_rexs, write_rexs
 from jaxgear.rexs.frame import frames
 from jaxgear.studies.gear_data import FACTORS, gears, mounting, rating_page

@@ -11,7 +11,7 @@ from helical_pairs import SIZES, TORQUE, pair_of, solved
 from scipy.optimize import minimize
 
 import jaxgear as jg
-from jaxgear import manufacture
+from jaxgear import geometry, manufacture
 from jaxgear.contact import removed_material
 from jaxgear.geometry import tooth_thickness
 from jaxgear.tolerance import ManufacturedGears, Tolerance, ToleranceClass, deviated_material
@@ -28,11 +28,11 @@ helical = pytest.mark.parametrize("gear", GEARS.values(), ids=map(str, GEARS))
 
 @helical
 def test_a_span_is_normal_base_pitches_and_a_base_tooth_thickness(gear):
-    teeth, base = manufacture.teeth_spanned(gear), jnp.cos(gear.base_helix_angle)
+    teeth, base = geometry.teeth_spanned(gear), jnp.cos(gear.base_helix_angle)
     wanted = (teeth - 1) * gear.base_pitch * base + tooth_thickness(gear, 2 * gear.base_radius) * base
-    found = manufacture.span(gear, teeth)
+    found = geometry.span(gear, teeth)
     assert float(found) == pytest.approx(float(wanted), rel=1e-12)
-    assert float(manufacture.allowance_of_span(gear, teeth, found)) == pytest.approx(-60.0, abs=1e-9)
+    assert float(geometry.allowance_of_span(gear, teeth, found)) == pytest.approx(-60.0, abs=1e-9)
     # nearest to d + 2 x m, where W_k = d_b tan(alpha_v) / cos(beta_b)
     middle = gear.pitch_radius + gear.profile_shift * gear.module
     nearest = 2 * jnp.sqrt(middle**2 - gear.base_radius**2) / base
@@ -53,15 +53,15 @@ def test_a_ball_touches_the_helicoids(gear):
             [radius * (np.cos(turn) + roll * np.sin(turn)), radius * (np.sin(turn) - roll * np.cos(turn)), height]
         )
 
-    centre = np.array([0.5 * (float(manufacture.over_balls(gear, BALL)) - BALL), 0.0, 0.0])
+    centre = np.array([0.5 * (float(geometry.over_balls(gear, BALL)) - BALL), 0.0, 0.0])
     found = minimize(lambda at: np.sum((point(at) - centre) ** 2), [0.5, 0.0], method="Nelder-Mead", tol=1e-14)
     assert np.sqrt(found.fun) == pytest.approx(0.5 * BALL, abs=1e-6)
-    measured = manufacture.over_balls(gear, BALL)
-    assert float(manufacture.allowance_of_balls(gear, BALL, measured)) == pytest.approx(-60.0, abs=1e-7)
+    measured = geometry.over_balls(gear, BALL)
+    assert float(geometry.allowance_of_balls(gear, BALL, measured)) == pytest.approx(-60.0, abs=1e-7)
 
 
 def test_measures_go_to_those_of_spur_gears():
-    spur, nearly = ([*manufacture.measures(replace(GEARS[15.0], helix_angle=beta))[1:]] for beta in (None, 1e-6))
+    spur, nearly = ([*geometry.measures(replace(GEARS[15.0], helix_angle=beta))[1:]] for beta in (None, 1e-6))
     np.testing.assert_allclose(nearly, spur, rtol=1e-12)
 
 
@@ -69,8 +69,8 @@ def test_a_narrow_helical_gear_has_no_span():
     """Both anvils must reach the face: W_k sin(beta_b)."""
     narrow = replace(GEARS[-25.0], face_width=14.0)
     with pytest.raises(ValueError, match=r"teeth = 4 takes 15.03 mm of the face, must take at most 14 mm"):
-        manufacture.span(narrow, 4)
-    assert np.isnan(manufacture.measures(narrow).span) and np.isfinite(manufacture.measures(GEARS[-25.0]).span)
+        geometry.span(narrow, 4)
+    assert np.isnan(geometry.measures(narrow).span) and np.isfinite(geometry.measures(GEARS[-25.0]).span)
 
 
 def test_more_is_ground_where_flanks_are_inclined():

@@ -23,7 +23,6 @@ from jaxgear.layout import (
     at_torque,
     crowning_off_the_edges,
     damage,
-    face_load_factors,
     face_load_over_torques,
     flank_line_tolerance,
     gear_lives,
@@ -34,10 +33,10 @@ from jaxgear.layout import (
     lives_in_cases,
     longest_life,
     tolerance_cases,
-    tolerance_line_load,
     vary_profiles,
     without_housing,
 )
+from jaxgear.layout.figures import face_load_factors, tolerance_line_load
 from jaxgear.layout.life import damage_of, under_loads
 from jaxgear.metrics import removed_at
 from jaxgear.metrics.safety import Strength

@@ -12,7 +12,7 @@ from catalogue import LINE, flank, gear_pair, kahraman_gear, prepare, solve
 from scipy.optimize import linprog
 
 import jaxgear as jg
-from jaxgear import manufacture
+from jaxgear import geometry, manufacture, tolerance
 from jaxgear.contact.kinematics import kinematics
 from jaxgear.geometry import diameter, outline
 from jaxgear.manufacture import best_wheel_spline, relief_start, wheel_profile, wheel_spline
@@ -373,8 +373,8 @@ def compilations():
             lambda s: manufacture.ground_volume(s, NONE, stock=-1.0),
             "stock = -1 um must be at least 0 um",
         ),
-        (lambda s: manufacture.span(s.gear, 2.5), "teeth = 2.5 must be a whole number of at least 1"),
-        (lambda s: manufacture.span(s.gear, 51), "teeth = 51 must be at most 50"),
+        (lambda s: geometry.span(s.gear, 2.5), "teeth = 2.5 must be a whole number of at least 1"),
+        (lambda s: geometry.span(s.gear, 51), "teeth = 51 must be at most 50"),
     ],
 )
 def test_what_cannot_be_meant_is_refused(side, call, problem):
@@ -389,11 +389,11 @@ def test_other_numbers_compile_nothing_anew(side):
         lambda x: manufacture.reference_volumes(side, x),
         lambda x: wheel_spline(side, relief, node=20.0 + x),
         lambda x: relief_start(side, jg.ProfileCrowning(2.0), 0.01 * x),
-        lambda x: manufacture.profile_trace(side, relief, face_coordinate=x),
-        lambda x: manufacture.helix_trace(side, relief, roll_length=20.0 + x),
+        lambda x: tolerance.profile_trace(side, relief, face_coordinate=x),
+        lambda x: tolerance.helix_trace(side, relief, roll_length=20.0 + x),
     )
     with compilations() as compiled:
-        manufacture.profile_trace(side, relief, points=83)
+        tolerance.profile_trace(side, relief, points=83)
     assert compiled, "the count sees what is compiled"
     for call in calls:
         call(1.0)

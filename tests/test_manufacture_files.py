@@ -11,7 +11,7 @@ import pytest
 from catalogue import TWO_PAIRS, kahraman_gear
 
 import jaxgear as jg
-from jaxgear import io, manufacture
+from jaxgear import io, manufacture, tolerance
 from jaxgear.contact.kinematics import kinematics
 
 _kinematics = eqx.filter_jit(kinematics)
@@ -47,7 +47,7 @@ def rows_of(path):
 
 def test_points_of_the_wheel(side, profile, tmp_path):
     """Both flanks to a nanometre; the radius of the wheel falls by y."""
-    path = io.write_wheel_points(tmp_path / "wheel.csv", profile, wheel=manufacture.GrindingWheel(150.0, 40.0))
+    path = manufacture.write_wheel_points(tmp_path / "wheel.csv", profile, wheel=manufacture.GrindingWheel(150.0, 40.0))
     rows = rows_of(path)
     assert [row["flank"] for row in rows] == ["left"] * 21 + ["right"] * 21
     table = np.array([[float(value) for name, value in row.items() if name != "flank"] for row in rows])
@@ -62,19 +62,19 @@ def test_points_of_the_wheel(side, profile, tmp_path):
 
 def test_flanks_that_differ(side, profile, tmp_path):
     other = manufacture.wheel_profile(side, jg.NoModification(), points=21)
-    rows = rows_of(io.write_wheel_points(tmp_path / "wheel.csv", profile, other))
+    rows = rows_of(manufacture.write_wheel_points(tmp_path / "wheel.csv", profile, other))
     assert "wheel_radius_mm" not in rows[0]
     assert float(rows[20]["x_mm"]) < -float(rows[41]["x_mm"]), "the relieved side is wider"
 
 
 def test_a_folder_that_is_not_there_is_named(profile, tmp_path):
     with pytest.raises(ValueError, match="missing/wheel.csv: cannot be written: No such file"):
-        io.write_wheel_points(tmp_path / "missing" / "wheel.csv", profile)
+        manufacture.write_wheel_points(tmp_path / "missing" / "wheel.csv", profile)
 
 
 def test_drawing_of_the_wheel_holds_the_points(profile, tmp_path):
     ezdxf = pytest.importorskip("ezdxf")
-    path = io.write_wheel_drawing(tmp_path / "wheel.dxf", profile)
+    path = manufacture.write_wheel_drawing(tmp_path / "wheel.dxf", profile)
     drawing = ezdxf.readfile(path)
     assert drawing.units == 4, "millimetres"
     left, right = drawing.modelspace().query("LWPOLYLINE")
@@ -87,7 +87,7 @@ def test_a_drawing_without_its_package_says_what_to_install(profile, tmp_path, m
     for module in ("ezdxf", "ezdxf.filemanagement"):  # which a test before may have imported
         monkeypatch.setitem(sys.modules, module, None)
     with pytest.raises(ModuleNotFoundError, match=r"write_wheel_drawing: .* ezdxf: pip install jaxgear\[cad\]"):
-        io.write_wheel_drawing(tmp_path / "wheel.dxf", profile)
+        manufacture.write_wheel_drawing(tmp_path / "wheel.dxf", profile)
     assert not list(tmp_path.iterdir())
 
 
@@ -115,14 +115,14 @@ def test_a_measured_flank_comes_back_as_it_was(side, tmp_path):
     profile_alone = "\n".join(line for line in MEASURED.splitlines() if "-8.0" not in line and "9.5" not in line)
     for text in (MEASURED, profile_alone):
         first = io.read_flank(written(tmp_path, text))
-        traces = manufacture.table_traces(side, first)
+        traces = tolerance.table_traces(side, first)
         path = io.write_traces(tmp_path / "chart.csv", traces, traces)
         given = [float(line.split(",")[-1]) for line in text.splitlines()[1:]]
         assert [float(row["measured_um"]) for row in rows_of(path)] == pytest.approx(given, abs=1e-9, rel=0)
         second = io.read_flank(path)
         assert type(second) is type(first)
         np.testing.assert_allclose(second.amount, first.amount, atol=1e-9, rtol=0)
-        again = io.write_traces(tmp_path / "again.csv", manufacture.table_traces(side, second), traces)
+        again = io.write_traces(tmp_path / "again.csv", tolerance.table_traces(side, second), traces)
         assert again.read_text() == path.read_text()
 
 
@@ -170,8 +170,8 @@ def test_flanks_csv_is_read_again(moving, side, tmp_path):
     for name, flanks in designs.items():
         for gear, design in zip(("pinion", "wheel"), flanks):
             read = io.read_flank(tmp_path / "flanks.csv", gear=gear, design=name)
-            for trace in manufacture.table_traces(side, read):
-                wanted = manufacture.profile_trace(
+            for trace in tolerance.table_traces(side, read):
+                wanted = tolerance.profile_trace(
                     side, design, face_coordinate=trace.face_coordinate[0], roll_length=trace.roll_length
                 )
                 np.testing.assert_allclose(trace.design, wanted.design, atol=6e-6)
@@ -184,18 +184,18 @@ def test_flanks_csv_is_read_again(moving, side, tmp_path):
 def test_a_profile_and_a_helix_make_a_flank(side, tmp_path):
     """Where both are the design's, their sum is the design, whose profile and lead do not depend on each other."""
     design = jg.TipRelief(6.0, 3.0, jg.Linear()) + jg.LeadCrowning(5.0)
-    traces = [manufacture.profile_trace(side, design, points=31), manufacture.helix_trace(side, design, points=21)]
+    traces = [tolerance.profile_trace(side, design, points=31), tolerance.helix_trace(side, design, points=21)]
     flank = io.read_flank(io.write_traces(tmp_path / "chart.csv", traces))
     for face in (-10.0, -4.0, 0.0, 10.0):
         options = {"face_coordinate": face, "roll_length": traces[0].roll_length}
-        found, wanted = (manufacture.profile_trace(side, each, **options) for each in (flank, design))
+        found, wanted = (tolerance.profile_trace(side, each, **options) for each in (flank, design))
         np.testing.assert_allclose(found.design, wanted.design, atol=1e-8)
 
 
 def test_measured_traces_of_other_places_are_refused(side, relief, tmp_path):
-    design = manufacture.profile_trace(side, relief, points=11)
-    few = manufacture.profile_trace(side, relief, points=9)
-    moved = manufacture.profile_trace(side, relief, face_coordinate=2.0, points=11)
+    design = tolerance.profile_trace(side, relief, points=11)
+    few = tolerance.profile_trace(side, relief, points=9)
+    moved = tolerance.profile_trace(side, relief, face_coordinate=2.0, points=11)
     with pytest.raises(ValueError, match=r"measured has traces of \[\(9,\)\] points, must be \[\(11,\)\]"):
         io.write_traces(tmp_path / "chart.csv", [design], [few])
     with pytest.raises(ValueError, match="write_traces: face_coordinate of measured trace 0 is not that of the design"):
@@ -205,7 +205,7 @@ def test_measured_traces_of_other_places_are_refused(side, relief, tmp_path):
 
 @pytest.mark.parametrize("column", ["roll_angle_deg", "diameter_mm"])
 def test_other_coordinates_need_the_base_radius(side, relief, tmp_path, column):
-    trace = manufacture.profile_trace(side, relief, points=11)
+    trace = tolerance.profile_trace(side, relief, points=11)
     rows = rows_of(io.write_traces(tmp_path / "chart.csv", [trace]))
     lines = [f"{column},design_um", *(f"{row[column]},{row['design_um']}" for row in rows)]
     path = written(tmp_path, "\n".join(lines))
@@ -337,7 +337,7 @@ def test_a_design_file_takes_the_flank_of_the_gear_that_it_stands_at(tmp_path):
 
 
 def test_a_side_brings_its_base_radius(side, tmp_path):
-    trace = manufacture.profile_trace(side, jg.TipRelief(6.0, 3.0), points=5)
+    trace = tolerance.profile_trace(side, jg.TipRelief(6.0, 3.0), points=5)
     lines = [f"{angle},{design}" for angle, design in zip(trace.roll_angle, trace.design)]
     path = written(tmp_path, "\n".join(["roll_angle_deg,design_um", *lines]))
     np.testing.assert_allclose(io.read_flank(path, side=side).position, trace.roll_length, rtol=1e-9)

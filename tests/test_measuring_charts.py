@@ -8,10 +8,9 @@ import pytest
 from catalogue import TWO_PAIRS, kahraman_gear
 
 import jaxgear as jg
-from jaxgear import manufacture
+from jaxgear import manufacture, tolerance
 from jaxgear.contact.kinematics import kinematics
-from jaxgear.manufacture import flank_deviations, helix_trace, profile_trace
-from jaxgear.tolerance import ToleranceClass
+from jaxgear.tolerance import ToleranceClass, flank_deviations, helix_trace, profile_trace
 
 _kinematics = eqx.filter_jit(kinematics)
 
@@ -45,7 +44,7 @@ PLACES = np.array(
 
 
 def test_places_along_the_profile(side):
-    place_of = jax.jit(manufacture.flank_place)
+    place_of = jax.jit(tolerance.flank_place)
     for roll, angle, size in PLACES:
         place = place_of(side, roll)
         assert float(place.roll_angle) == pytest.approx(angle, abs=1e-4)
@@ -89,8 +88,8 @@ def test_band_of_the_class_within_the_evaluation_range(side, quality):
 def test_face_ends_of_a_wide_gear_are_a_module(side):
     """5 % of 20 mm is 1 mm; of a face of 100 mm it would be 5, more than the module of 3 mm."""
     wide = pinion_of(jg.Gear(50, 3.0, face_width=100.0, tip_diameter=154.5709, bore_diameter=50.0))
-    np.testing.assert_allclose(manufacture.helix_range(wide), (-47.0, 47.0))
-    np.testing.assert_allclose(manufacture.helix_range(side), (-9.0, 9.0))
+    np.testing.assert_allclose(tolerance.helix_range(wide), (-47.0, 47.0))
+    np.testing.assert_allclose(tolerance.helix_range(side), (-9.0, 9.0))
 
 
 def test_deviations_of_known_errors(side):

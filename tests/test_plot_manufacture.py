@@ -10,7 +10,8 @@ import pytest  # noqa: E402
 from catalogue import kahraman_gear, prepare  # noqa: E402
 
 import jaxgear as jg  # noqa: E402
-from jaxgear import manufacture, plot  # noqa: E402
+from jaxgear import manufacture, plot, tolerance  # noqa: E402
+from jaxgear.manufacture import figures  # noqa: E402
 from jaxgear.tolerance import ToleranceClass  # noqa: E402
 
 pytestmark = pytest.mark.usefixtures("clean_figures")
@@ -35,7 +36,7 @@ def quality(side):
 
 def test_wheel_fits_the_tooth_space(side):
     """The active profile bounds the gear on both sides; nothing of the gear is drawn within the space."""
-    ax = plot.tooth_space(side, jg.NoModification())
+    ax = figures.tooth_space(side, jg.NoModification())
     left, right = ax.lines[:2]
     profile = manufacture.wheel_profile(side, jg.NoModification())
     np.testing.assert_allclose(right.get_xydata(), np.stack([profile.x, profile.y], axis=1))
@@ -48,18 +49,18 @@ def test_wheel_fits_the_tooth_space(side):
 
 def test_deviation_of_the_wheel_with_its_limit(side):
     splines = {f"degree {degree}": manufacture.wheel_spline(side, RELIEF, degree=degree) for degree in (2, 3)}
-    ax = plot.wheel_deviation(splines, limit=0.5)
+    ax = figures.wheel_deviation(splines, limit=0.5)
     for line, (name, spline) in zip(ax.lines, splines.items()):
         np.testing.assert_array_equal(line.get_ydata(), spline.deviation)
         assert line.get_label().startswith(name)
     assert [line.get_ydata()[0] for line in ax.lines[2:]] == [-0.5, 0.5]
     assert ax.get_xlabel().endswith("[mm]") and ax.get_ylabel().endswith("[µm]")
-    assert len(plot.wheel_deviation(splines, limit=None).lines) == 2
+    assert len(figures.wheel_deviation(splines, limit=None).lines) == 2
 
 
 def test_volumes_as_bars(side):
     found = manufacture.reference_volumes(side, 6.0)._asdict()
-    ax = plot.volumes(found)
+    ax = figures.volumes(found)
     assert [bar.get_width() for bar in ax.patches] == pytest.approx([float(value) for value in found.values()])
     assert [text.get_text() for text in ax.texts] == ["15.3", "10.4", "8.5", "5.7"]
     assert [label.get_text() for label in ax.get_yticklabels()] == list(found)
@@ -95,7 +96,7 @@ def test_band_of_the_class_about_the_first_design(mesh, quality, chart):
     assert low > vertices[:, 1].max() and high < vertices[:, 1].min()
     labels = [text.get_text() for text in panels[0].figure.legends[0].get_texts()]
     assert labels == ["design", "none", "ISO 1328 tolerance about design"]
-    assert np.asarray(manufacture.profile_trace(mesh.sides[0], design, quality).design).max() == 0.0
+    assert np.asarray(tolerance.profile_trace(mesh.sides[0], design, quality).design).max() == 0.0
 
 
 @pytest.fixture(scope="module")

@@ -19,9 +19,8 @@ from helical_pairs import SIZES
 import jaxgear as jg
 from jaxgear import metrics
 from jaxgear.contact.kinematics import kinematics
-from jaxgear.geometry import diameter, margins, outline, path_of_contact
+from jaxgear.geometry import diameter, drawn_gear, margins, measures, outline, path_of_contact, teeth_spanned
 from jaxgear.geometry.margins import play_between
-from jaxgear.manufacture import drawn_gear, measures, teeth_spanned
 from jaxgear.metrics.stress import (
     contact_factor_squares,
     critical_section,

@@ -12,9 +12,9 @@ from catalogue import LINE, gear_pair, prepare
 from rexs_schema import FOLDER, faults
 
 import jaxgear as jg
+from jaxgear.geometry import span
 from jaxgear.io import describe
 from jaxgear.io.table_keys import family
-from jaxgear.manufacture import span
 from jaxgear.microgeometry import AbstractCurve, AbstractModification, TabulatedFlank
 from jaxgear.numerics import number
 from jaxgear.rexs import read_rexs, write_rexs

@@ -17,8 +17,8 @@ from catalogue import LINE, gear_pair, prepare
 
 import jaxgear as jg
 from jaxgear.cli import main
+from jaxgear.geometry import over_balls, span
 from jaxgear.io import DesignFileError, load_design
-from jaxgear.manufacture import over_balls, span
 from jaxgear.rexs import read_rexs, write_rexs
 from jaxgear.rexs.frame import frames
 

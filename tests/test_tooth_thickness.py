@@ -8,16 +8,17 @@ from catalogue import TWO_PAIRS, gear_pair, kahraman_gear
 
 import jaxgear as jg
 from jaxgear.contact.kinematics import kinematics
-from jaxgear.geometry import outline, path_of_contact
-from jaxgear.manufacture import (
+from jaxgear.geometry import (
     allowance_of_balls,
     allowance_of_span,
     measures,
+    outline,
     over_balls,
-    space_flank,
+    path_of_contact,
     span,
     teeth_spanned,
 )
+from jaxgear.manufacture import space_flank
 from jaxgear.metrics.stress import single_contact_factors
 
 GEARS = {
@@ -178,7 +179,7 @@ def test_the_root_moves_with_the_allowance_of_traced_gears():
         return jg.Gear(20, 3.0, face_width=20.0, tooth_thickness_allowance=allowance).root_circle_radius
 
     def drawn(length):
-        return jg.manufacture.drawn_gear(
+        return jg.geometry.drawn_gear(
             teeth=17, module=8.0, profile_shift=0.14522, helix_angle=15.8, face_width=100.0, tip_diameter=159.66,
             dedendum=1.4, root_radius=0.39, span=length, teeth_spanned=2,
         ).root_circle_radius  # fmt: skip

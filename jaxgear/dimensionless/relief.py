@@ -95,7 +95,7 @@ def tip_relief(relief: CycleRelief, pair: GearPair, half_clearance: Given) -> Ti
     """The tip relief of either gear that takes a modification of the mesh cycle off its flanks.
 
     The last step of a dynamic profile modification: the distance on the line of action is one of roll length, which
-    over the base radius is a roll angle (`manufacture.profile_trace` tabulates the flank over either).
+    over the base radius is a roll angle (`tolerance.profile_trace` tabulates the flank over either).
 
     Args:
         relief: C, as `dynamic_profile_modification` finds it.

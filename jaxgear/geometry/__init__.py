@@ -1,5 +1,7 @@
 """Gears, their pairing, the generated tooth outline and the path of contact (external involute gears).
 
+`drawn_gear` makes a gear from the tooth thickness and the diameters on its drawing.
+
 Coordinates and signs used everywhere:
 
 - the pinion drives, the wheel is driven, whatever their tooth numbers;
@@ -14,6 +16,9 @@ Coordinates and signs used everywhere:
 
 from . import material as _material
 from .backlash import pair_with_backlash as pair_with_backlash
+from .drawing import ToothProfile as ToothProfile
+from .drawing import drawn_gear as drawn_gear
+from .drawing import with_profile as with_profile
 from .gear import Gear as Gear
 from .gear import check_spur as check_spur
 from .involute import diameter as diameter
@@ -34,6 +39,15 @@ from .pair import pair_geometry as pair_geometry
 from .pair import path_of_contact as path_of_contact
 from .path import PathOfContact as PathOfContact
 from .path import reduced_radius as reduced_radius
+from .thickness import Measures as Measures
+from .thickness import ToothThickness as ToothThickness
+from .thickness import allowance_of_balls as allowance_of_balls
+from .thickness import allowance_of_span as allowance_of_span
+from .thickness import measures as measures
+from .thickness import over_balls as over_balls
+from .thickness import span as span
+from .thickness import teeth_spanned as teeth_spanned
+from .thickness import with_thickness as with_thickness
 
 STEEL: Material
 

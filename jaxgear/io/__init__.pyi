@@ -18,8 +18,6 @@ from .results import write_flanks as write_flanks
 from .results import write_front as write_front
 from .results import write_summary as write_summary
 from .results import write_traces as write_traces
-from .results import write_wheel_drawing as write_wheel_drawing
-from .results import write_wheel_points as write_wheel_points
 from .rows import read_variants as read_variants
 from .sweep_table import SweepSection as SweepSection
 from .teeth_table import teeth_of as teeth_of

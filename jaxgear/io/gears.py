@@ -5,8 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from ..geometry import Gear, GearPair, Material, pair_with_backlash
-from ..manufacture import ToothProfile, ToothThickness, drawn_gear
+from ..geometry import Gear, GearPair, Material, ToothProfile, ToothThickness, drawn_gear, pair_with_backlash
 from ..microgeometry import AbstractModification
 from ..numerics import Number, UnitKey, changed, fields_of
 from ..numerics import real as real_number

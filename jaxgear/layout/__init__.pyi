@@ -8,8 +8,6 @@ from .cases import flank_line_tolerance as flank_line_tolerance
 from .cases import helix_slope_limits as helix_slope_limits
 from .cases import lives_in_cases as lives_in_cases
 from .cases import tolerance_cases as tolerance_cases
-from .figures import face_load_factors as face_load_factors
-from .figures import tolerance_line_load as tolerance_line_load
 from .findings import layout_findings as layout_findings
 from .flank_line import FlankLine as FlankLine
 from .flank_line import Stations as Stations

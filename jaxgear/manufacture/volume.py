@@ -17,7 +17,7 @@ from ..metrics import Quantity, Vocabulary, gear_volume, removed_at
 from ..microgeometry import AbstractCurve, AbstractModification, Linear, NoModification, Quadratic, TipRelief
 from ..numerics import Given, check, concrete, program, real, safe_divide
 from ..numerics.reductions import Max
-from .wheel_spline import wheel_spline
+from .spline import wheel_spline
 
 Scalar = Float[Array, ""]
 

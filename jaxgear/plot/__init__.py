@@ -30,9 +30,6 @@ from .flank import topography as topography
 from .front import optimum_front as optimum_front
 from .front import parallel_coordinates as parallel_coordinates
 from .front import pareto as pareto
-from .grinding import tooth_space as tooth_space
-from .grinding import volumes as volumes
-from .grinding import wheel_deviation as wheel_deviation
 from .mesh_cycle import load_sharing as load_sharing
 from .mesh_cycle import mesh_stiffness as mesh_stiffness
 from .mesh_cycle import pressure as pressure

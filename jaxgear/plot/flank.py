@@ -12,11 +12,10 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.ticker import MaxNLocator
 
 from ..contact import Mesh, MeshCycle, Side
-from ..manufacture import helix_trace, profile_trace
 from ..metrics import flank_surface, removed_at
 from ..microgeometry import AbstractModification, NoModification
 from ..numerics import over_slices
-from ..tolerance import ToleranceClass
+from ..tolerance import ToleranceClass, helix_trace, profile_trace
 from .figure import (
     ABOVE,
     GREY,

@@ -6,9 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from ..geometry import Gear
+from ..geometry import Gear, allowance_of_balls, measures, over_balls
 from ..io.errors import refused
-from ..manufacture import allowance_of_balls, measures, over_balls
 from ..numerics import real
 from .model import Component
 from .open_numbers import Completed, rack_by_hand

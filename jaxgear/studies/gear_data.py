@@ -8,12 +8,11 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from ..geometry import Gear, GearPair, Outline, PathOfContact, diameter, explicit, pair_geometry
+from ..geometry import Gear, GearPair, Outline, PathOfContact, diameter, explicit, measures, pair_geometry
 from ..geometry.gear import has_full_radius, tool_name
 from ..geometry.pair import PairGeometry
 from ..io import DesignFile
 from ..io.tolerance_table import quality_classes
-from ..manufacture import measures
 from ..numerics import Given, UnitKey, changed, program
 from ..report import Chapter, Table, text
 from ..tolerance import ToleranceClass, iso_rounded

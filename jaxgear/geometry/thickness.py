@@ -12,9 +12,10 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from ..geometry import Gear, outline
-from ..geometry.involute import involute
 from ..numerics import Checked, Given, Numbers, bracketed_root, check, concrete, count, number, real, whole
+from .gear import Gear
+from .involute import involute
+from .outline import outline
 
 Scalar = Float[Array, ""]
 

@@ -27,6 +27,7 @@ from ..microgeometry import (
 )
 from ..numerics import Checked, Given, check, concrete, maximum, program, result
 from ..numerics.fits import Criterion, fit
+from ..tolerance import FlankPlace, flank_place
 from .wheel import space_point
 
 Scalar = Float[Array, ""]
@@ -115,6 +116,11 @@ def _relief_start(side: Side, modification: AbstractModification, threshold: Sca
     found = roll[cell] + jnp.clip(share, 0.0, 1.0) * (roll[cell + 1] - roll[cell])
     found = jnp.where(untouched[-1], roll[-1], found)
     return jnp.where(jnp.any(untouched), found, roll[0])
+
+
+def start_of_relief(side: Side, modification: AbstractModification) -> FlankPlace:
+    """Start of the tip relief on the flank (`relief_start`)."""
+    return flank_place(side, relief_start(side, modification))
 
 
 def wheel_spline(

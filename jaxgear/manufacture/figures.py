@@ -8,9 +8,10 @@ from matplotlib.axes import Axes
 
 from ..contact import Side
 from ..geometry import outline
-from ..manufacture import WheelSpline, wheel_profile
 from ..microgeometry import AbstractModification
-from .figure import GREY, PALE, legend_above, line_style, report_axes
+from ..plot.figure import GREY, PALE, legend_above, line_style, report_axes
+from .spline import WheelSpline
+from .wheel import wheel_profile
 
 _FILLET_POINTS = 60
 _ABOVE_TIP = 0.15  # of the tooth depth; how far the wheel is drawn beyond the tip circle

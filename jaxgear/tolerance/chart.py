@@ -15,8 +15,7 @@ from ..geometry import diameter, roll_angle
 from ..metrics import removed_at
 from ..microgeometry import AbstractModification, TabulatedFlank, TabulatedProfile
 from ..numerics import Checked, Given, check, concrete, maximum, minimum, program, result, whole
-from ..tolerance import ToleranceClass, iso_rounded
-from .wheel_spline import relief_start
+from .limits import ToleranceClass, iso_rounded
 
 Scalar = Float[Array, ""]
 Points = Float[Array, " points"]
@@ -106,11 +105,6 @@ def helix_range(side: Side) -> tuple[Scalar, Scalar]:
 def flank_place(side: Side, roll_length: Float[Array, "..."]) -> FlankPlace:
     """A roll length [mm] as roll angle and diameter too."""
     return FlankPlace(roll_length, roll_angle(side.gear, roll_length), diameter(side.gear, roll_length))
-
-
-def start_of_relief(side: Side, modification: AbstractModification) -> FlankPlace:
-    """Start of the tip relief on the flank (`relief_start`)."""
-    return flank_place(side, relief_start(side, modification))
 
 
 def profile_trace(

@@ -1,20 +1,22 @@
-"""Tip and root of a tooth as drawings give them: by diameters and heights, where a rack has coefficients."""
+"""A gear as its drawing describes it: tip and root by diameters and heights, where a rack has coefficients."""
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import fields, replace
 from typing import Any
 
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
-from ..geometry import Gear, outline
-from ..geometry.gear import full_radius, has_full_radius
 from ..numerics import Checked, concrete, number, safe_sqrt
+from .gear import Gear, full_radius, has_full_radius
+from .outline import outline
+from .thickness import WAYS, ToothThickness, with_thickness
 
 Scalar = Float[Array, ""]
 
 # what each says in place of a field of `Gear`
-REPLACED = {
+_REPLACED = {
     "root_diameter": "dedendum",
     "root_form_diameter": "root_radius",
     "full_root_radius": "root_radius",
@@ -100,3 +102,37 @@ def _named(name: str, made: Callable[[], Any]) -> Any:
         return made()
     except ValueError as error:
         raise ValueError(f"ToothProfile: {name}: {str(error).partition(': ')[2]}") from error
+
+
+def drawn_gear(**given: Any) -> Gear:
+    """A gear with what its drawing says: the arguments of `Gear`, of `ToothThickness` and of `ToothProfile`.
+
+    Raises:
+        ValueError: for what any of them refuses, for a `tooth_thickness_tolerance` beside lower and upper limit, and
+            for a number of the drawing beside the one that it replaces.
+    """
+    profile = _taken(given, ToothProfile)
+    for name in profile:
+        if profile[name] is not False and given.get(_REPLACED[name]) is not None:
+            raise ValueError(f"ToothProfile: {name}: cannot be given with {_REPLACED[name]}: give one of them")
+    gear = _thick_gear(given)
+    return with_profile(gear, ToothProfile(**profile)) if profile else gear
+
+
+def _thick_gear(given: dict[str, Any]) -> Gear:
+    thickness = _taken(given, ToothThickness)
+    if not thickness:
+        return Gear(**given)
+    says = ToothThickness(**thickness)
+    if given.get("tooth_thickness_tolerance") is not None:
+        which = next(name for name in WAYS if name in thickness)
+        if which != "tooth_thickness_allowance" or np.ndim(thickness[which]):
+            raise ValueError(f"Gear: tooth_thickness_tolerance: has no effect, give lower and upper limit of {which}")
+        return Gear(**given, **thickness)
+    return with_thickness(Gear(**given), says)
+
+
+def _taken(given: dict[str, Any], cls: type) -> dict[str, Any]:
+    """Takes the fields of a class that are not None out of what is given."""
+    found = {field.name: given.pop(field.name, None) for field in fields(cls)}
+    return {name: value for name, value in found.items() if value is not None}
