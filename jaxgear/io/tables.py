@@ -102,6 +102,16 @@ class FurtherTable(FileTable):
         """
         return ()
 
+    def part(self, design: Any, name: str, cycle: MeshCycle) -> Any:
+        """What the table adds to the result of an analysis, a `report.Part`; by default None.
+
+        Args:
+            design: the `DesignFile`.
+            name: of the design that the result is about.
+            cycle: of that design with its flanks, under the design torque.
+        """
+        return None
+
     def quantity(self, design: Any, key: str, quantity: Quantity) -> Quantity:
         """A quantity of the settings that the table stands for, with them.
 

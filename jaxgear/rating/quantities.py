@@ -49,21 +49,21 @@ def _rated(analysis: Analysis, rating: Rating) -> PairRating:
         rating,
         path=cycle.kinematics.path_of_contact,
         face_load_factor=over_several_slices(face_load_factor, cycle),
-        tip_relief=ends_relief(analysis),
+        tip_relief=jnp.min(ends_relief(analysis)),
     )
 
 
-def ends_relief(analysis: Analysis) -> Scalar:
-    """C_a [um]: the smaller of C_a1 + C_f2 and C_a2 + C_f1, what the flanks give way at the ends of the path."""
+def ends_relief(analysis: Analysis) -> Float[Array, " gears"]:
+    """C_a of both tips [um]: C_a1 + C_f2 and C_a2 + C_f1, what the flanks give way at the ends E and A of the path."""
     cycle = analysis.cycle
     path = cycle.kinematics.path_of_contact
-    ends = jnp.stack([path.start, path.end])
+    ends = jnp.stack([path.end, path.start])
     removed = jnp.zeros_like(ends)
     flanks = (cycle.pinion, path.pinion_roll_length(ends)), (cycle.wheel, path.wheel_roll_length(ends))
     for side, (modification, rolls) in zip(cycle.sides, flanks):
         if modification is not None:
             removed = removed + removed_at(side, modification, rolls)
-    return jnp.maximum(jnp.min(removed), 0.0)
+    return jnp.maximum(removed, 0.0)
 
 
 def _of(number: Number, analysis: Analysis, rating: Rating) -> Any:

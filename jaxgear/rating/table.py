@@ -11,9 +11,12 @@ from ..io.tables import FurtherTable
 from ..io.value_types import WEIGHTS, list_of, positive
 from ..metrics import Analysis, Finding, Quantity
 from ..numerics import optional_real, real
+from ..report import Part
 from .findings import rating_findings
 from .quantities import rating_of
+from .report import part
 from .settings import GearRating, Rating, check_metal
+from .thermal_quantities import missing, thermal_of
 
 _GEARS = "pinion", "wheel"
 _ROUNDED = 1e-6  # by which shares may miss their sum
@@ -66,6 +69,8 @@ class RatingSection(FurtherTable, section_of(Rating, (*_GEARS, "lubricant", "loa
         settings = self.settings(design)
         if quantity.needs and getattr(settings, quantity.needs) is None:
             raise DesignFileError(key, f'"{quantity.name}" needs rating.{quantity.needs}')
+        if lacks := missing(quantity.name, settings.lubricant):
+            raise DesignFileError(key, f'"{quantity.name}" needs {lacks}')
         return quantity.with_settings(settings)
 
     def settings(self, design: DesignFile) -> Rating:
@@ -89,9 +94,13 @@ class RatingSection(FurtherTable, section_of(Rating, (*_GEARS, "lubricant", "loa
 
     def findings(self, design: DesignFile, cycle: MeshCycle) -> tuple[Finding, ...]:
         """Numbers of the rating that are out of the validity of ISO 6336."""
-        rating, point = self.settings(design), OperatingPoint(real(design.torque), optional_real(design.speed))
-        found = rating_of(Analysis(replace(cycle, operating_point=point)), rating)
-        return rating_findings(cycle.kinematics.pair, rating, found)
+        rating = self.settings(design)
+        return rating_findings(cycle.kinematics.pair, rating, rating_of(_analysis(design, cycle), rating))
+
+    def part(self, design: DesignFile, name: str, cycle: MeshCycle) -> Part:
+        """The rating for the terminal, the report and the files."""
+        rating, analysis = self.settings(design), _analysis(design, cycle)
+        return part(rating_of(analysis, rating), thermal_of(analysis, rating), rating, name)
 
     def _gear(self, name: str, quality: int | None) -> GearRating:
         section = getattr(self, name)
@@ -121,6 +130,11 @@ class RatingSection(FurtherTable, section_of(Rating, (*_GEARS, "lubricant", "loa
             problem = f"{self.weights} sum to {sum(self.weights):g}, must sum to 1"
             raise DesignFileError("rating.weights", problem)
         return spectrum
+
+
+def _analysis(design: DesignFile, cycle: MeshCycle) -> Analysis:
+    running = OperatingPoint(real(design.torque), optional_real(design.speed))
+    return Analysis(replace(cycle, operating_point=running))
 
 
 # any one of several keys, and what needs it

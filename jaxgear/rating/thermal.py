@@ -3,12 +3,14 @@
 import jax.numpy as jnp
 
 from ..metrics.lubricant import Lubricant
-from ..numerics import Checked, result
+from ..numerics import Checked, Given, program, result
+from .chain import PairRating
 from .load_sharing import MeshLoad
 from .losses import churning_loss, hydraulic_torque, loss_factor, mesh_friction, mesh_loss
 from .mesh_geometry import MeshGeometry, OfGears, Scalar
-from .micropitting import Micropitting, micropitting
+from .micropitting import Micropitting, material_factor, micropitting
 from .scuffing import FlashScuffing, IntegralScuffing, flash_scuffing, integral_scuffing
+from .settings import Rating
 
 
 class ThermalRating(Checked):
@@ -35,6 +37,50 @@ class ThermalRating(Checked):
     efficiency: Scalar = result()
     no_load_loss_power: Scalar = result("W")
     churning_loss_power: Scalar = result("W")
+
+
+def thermal_rating(
+    found: PairRating, torque: Given, speed: Given, rating: Rating, tip_relief: Given = 0.0
+) -> ThermalRating:
+    """Scuffing, micropitting and losses of a rated pair.
+
+    Args:
+        found: rating of the pair, for its geometry and load factors.
+        torque: on the pinion, nominal [N m].
+        speed: of the pinion [rpm].
+        rating: settings, with the lubricant.
+        tip_relief: C_a of pinion and wheel as designed, where the rating gives none [um].
+
+    Raises:
+        ValueError: for a rating without lubricant.
+    """
+    if rating.lubricant is None:
+        raise ValueError("scuffing, micropitting and losses need the lubricant")
+    dtype = found.tangential_force.dtype
+    relief = tip_relief if rating.tip_relief is None else rating.tip_relief
+    numbers = (jnp.asarray(each, dtype) for each in (torque, speed))
+    return _thermal(found, *numbers, rating, jnp.broadcast_to(jnp.asarray(relief, dtype), (2,)))
+
+
+@program
+def _thermal(found: PairRating, torque: Scalar, speed: Scalar, rating: Rating, tip_relief: OfGears) -> ThermalRating:
+    assert rating.lubricant is not None
+    factors, grades = found.factors, [gear.quality_class or 0 for gear in rating.gears]
+    limits = jnp.stack([gear.pitting_strength for gear in rating.gears])
+    load = MeshLoad(
+        torque=torque,
+        speed=speed,
+        outer_factors=factors.application * factors.mesh,
+        load_factors=factors.flank,
+        single_stiffness=factors.single_stiffness,
+        mesh_stiffness=factors.mesh_stiffness,
+        tip_relief=tip_relief,
+        running_in_relief=jnp.mean((limits / 97 - 18.45) ** 2 / 18 + 1.5),  # ISO 6336-1, mean of both materials
+        accuracy_grade=jnp.full_like(torque, max(grades)),
+        meshes=jnp.maximum(*(gear.contacts_per_revolution for gear in rating.gears)),
+    )
+    materials = jnp.stack([material_factor(gear) for gear in rating.gears])
+    return rate_thermal(found.geometry, load, rating.lubricant, materials)
 
 
 def rate_thermal(

@@ -5,6 +5,7 @@ It shows what it is handed, tables, lines and pictures, and computes nothing. Ne
 
 from .page import Chapter as Chapter
 from .page import Figure as Figure
+from .page import Part as Part
 from .page import Picture as Picture
 from .page import Table as Table
 from .page import heading as heading
@@ -17,5 +18,6 @@ from .records import Record as Record
 from .records import numbers_of as numbers_of
 from .records import table_of as table_of
 from .variants import MOST_ROWS as MOST_ROWS
+from .variants import write_tables as write_tables
 from .variants import write_variants as write_variants
 from .variants import write_workbook as write_workbook

@@ -3,7 +3,7 @@
 import base64
 import struct
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
@@ -144,6 +144,23 @@ class Chapter:
     figures: Sequence[Picture] = ()
     literal: str = ""
     new_page: bool = False
+
+
+@dataclass(frozen=True)
+class Part:
+    """What a table of a design file adds to the result of an analysis.
+
+    Attributes:
+        tables: to be read first, after those of the designs.
+        chapters: of the report.
+        data: for `summary.json`, under the name of the table.
+        lines: rows of a CSV file of that name, the first its header; none without any.
+    """
+
+    tables: tuple[Table, ...] = ()
+    chapters: tuple[Chapter, ...] = ()
+    data: Mapping[str, Any] = field(default_factory=dict)
+    lines: tuple[tuple[str, ...], ...] = ()
 
 
 _TEMPLATES = Path(__file__).parent / "templates"

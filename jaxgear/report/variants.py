@@ -12,7 +12,7 @@ from ..io import writing
 from ..numerics.durable import write_durably
 from ..sweeps import SweepTable
 from ..sweeps.columns import axis_label
-from .page import needed, printable, rendered, write_text
+from .page import Table, needed, printable, rendered, write_text
 
 # a sheet of this many rows and some tens of columns opens in seconds; Excel itself ends at 1 048 576
 MOST_ROWS = 20_000
@@ -51,6 +51,36 @@ def write_workbook(path: Path, facts: Sequence[tuple[str, str]], best: SweepTabl
         about.set_column(1, 1, 3 * _WIDEST)
         _sheet(book.add_worksheet("best"), best, bold)
         _sheet(book.add_worksheet("variants" if every else "best variants"), shown, bold)
+    with writing(path):
+        write_durably(path, lambda file: file.write(held.getvalue()))
+
+
+def write_tables(path: Path, facts: Sequence[tuple[str, str]], tables: Sequence[Table]) -> None:
+    """Writes tables as a workbook, each under its title in a sheet of its own, numbers as numbers.
+
+    Args:
+        path: file to write.
+        facts: names and texts of the first sheet.
+        tables: the tables.
+
+    Raises:
+        ValueError: without the library xlsxwriter, or when the file cannot be written.
+    """
+    needed("xlsxwriter")
+    import xlsxwriter
+
+    held = BytesIO()
+    with xlsxwriter.Workbook(held, {"in_memory": True, "strings_to_numbers": True}) as book:
+        bold = book.add_format({"bold": True, "text_wrap": True, "valign": "top"})
+        about = Table(("", ""), tuple(facts), "about")
+        for number, table in enumerate([about, *tables]):
+            # a sheet has a name of its own, of at most 31 letters
+            sheet = book.add_worksheet(f"{number} {table.title.partition(',')[0]}"[:31] if number else "about")
+            sheet.write_row(0, 0, table.header, bold)
+            for row, cells in enumerate(table.rows, 1):
+                sheet.write_row(row, 0, cells)
+            sheet.set_column(0, len(table.header) - 1, _WIDEST // 2)
+            sheet.freeze_panes(1, 1)
     with writing(path):
         write_durably(path, lambda file: file.write(held.getvalue()))
 

@@ -1,19 +1,23 @@
 """Result of a comparison of designs: tables, text, figures and files."""
 
-from collections.abc import Iterator, Mapping
+import csv
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
 from ..contact import Mesh
 from ..geometry import Gear
 from ..io import DesignFile, write_flanks
+from ..io.tables import FurtherTable
 from ..metrics import Finding
 from ..numerics import UnitKey, fields_of
 from ..optimize import Verified
-from ..report import Chapter, Figure, Table, numbers, text
+from ..report import Chapter, Figure, Part, Table, numbers, text, write_tables
 from ..shafts import RigidSupport
 from ..vocabulary import quantities
 from . import manufactured, side_by_side
@@ -79,14 +83,36 @@ class ComparisonResult(AbstractStudyResult):
             UnitKey("ppte_reduction", "%"): _reduction(evaluations),
             "ppte_over_torque": {UnitKey("torque", "N m"): self.torques, **ppte},
             "iso_6336": self._rating(),
+            **{name: part.data for name, part in self.parts.items()},
         }
 
     def _rating(self) -> dict[str, dict[str, float]]:
         return {name: {key: of.factors[key] for key in FACTORS} for name, of in self.evaluations.items()}
 
     def write(self, folder: Path) -> None:
-        """The flanks of all designs as `flanks.csv`."""
+        """The flanks of all designs as `flanks.csv`, and what tables of the file add to them."""
         write_flanks(folder / "flanks.csv", self.mesh, side_by_side.flanks(self.evaluations))
+        for name, part in self.parts.items():
+            if part.lines:
+                with (folder / f"{name}.csv").open("w", newline="", encoding="utf-8") as file:
+                    csv.writer(file).writerows(part.lines)
+
+    def reported(self, folder: Path, facts: Sequence[tuple[str, str]], *, figures: bool) -> Self:
+        """The result, after a workbook of what tables of the file add to it, where the library for it is installed."""
+        for name, part in self.parts.items():
+            if find_spec("xlsxwriter") is not None:
+                tables = [table for chapter in part.chapters for table in chapter.tables]
+                write_tables(folder / f"{name}.xlsx", facts, tables)
+        return self
+
+    @cached_property
+    def parts(self) -> dict[str, Part]:
+        """What tables of the file add to the main design, by their names."""
+        name = side_by_side.main_name(self.evaluations)
+        cycle = self.evaluations[name].cycle
+        tables = {key: each for key, each in self.design.tables.items() if isinstance(each, FurtherTable)}
+        found = {key: each.part(self.design, name, cycle) for key, each in tables.items()}
+        return {key: each for key, each in found.items() if each is not None}
 
     def figures(self) -> Iterator[Figure]:
         """Designs, and their scatter over manufactured gears."""
@@ -94,8 +120,10 @@ class ComparisonResult(AbstractStudyResult):
         yield from manufactured.figures(self.evaluations)
 
     def tables(self) -> Iterator[Table]:
-        """The designs side by side."""
+        """The designs side by side, and what tables of the file add."""
         yield side_by_side.table(self.design, self.evaluations)
+        for part in self.parts.values():
+            yield from part.tables
 
     def verdict(self) -> Iterator[str]:
         """The grid and its error, notes, and how the gears are mounted."""
@@ -129,9 +157,12 @@ class ComparisonResult(AbstractStudyResult):
                     yield f"{name}: by finite elements, {key}", value
 
     def chapters(self) -> Iterator[Chapter]:
-        """Robustness, where the file has tolerances, and the rating by ISO 6336."""
+        """Robustness, where the file has tolerances, what tables of the file add, and the stresses by ISO 6336."""
         yield from manufactured.pages(self.design, self.evaluations)
-        yield rating_page(self._rating())
+        for part in self.parts.values():
+            yield from part.chapters
+        if not self.parts:
+            yield rating_page(self._rating())
 
 
 def _design(evaluation: Evaluation) -> dict[str, Any]:
