@@ -188,6 +188,7 @@ OF_ANY_TYPE = {
     "io/table_keys.py entry": "stands for the value of a key, whose annotation says the type",
     "io/tables.py FurtherTable.check": "takes a `DesignFile`, whose file imports this one",
     "io/tables.py FurtherTable.findings": "likewise",
+    "io/tables.py FurtherTable.part": "likewise",
     "io/tables.py FurtherTable.quantity": "likewise",
     "io/template.py Part.build": "makes an object of the class that the part names",
     "rexs/model.py checked_object": "data of a file, of any type",

@@ -1,23 +1,25 @@
-"""The report of a rating: the numbers of a published one from a design file, spectrum, files, and what lacks an input."""
+"""The report of a rating: numbers of a published one from a design file, spectrum, files, what lacks an input."""
 
-import csv
-import re
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 from catalogue import LINE
+from rated_pairs import STAGE_3
+from rated_pairs import rated as rated_by
 
 import jaxgear as jg
-from jaxgear.conditions import LoadSpectrum
 from jaxgear.contact import OperatingPoint
 from jaxgear.io import DesignFileError, load_design
 from jaxgear.io.named_quantities import quantity_named
-from jaxgear.numerics import changed
+from jaxgear.numerics import changed, real
 from jaxgear.rating import rate, report
+from jaxgear.rating.chain import Spectrum
 from jaxgear.rating.thermal import thermal_rating
 from jaxgear.report import write_report, write_tables
 from jaxgear.studies.comparison_result import ComparisonResult
@@ -27,15 +29,11 @@ EXAMPLE, GUIDE = ROOT / "examples" / "rated_24_95.toml", ROOT / "examples" / "gu
 
 
 @pytest.fixture(scope="module")
-def design():
-    return load_design(EXAMPLE)
-
-
-@pytest.fixture(scope="module")
-def rated(design):
-    rating = design.tables["rating"].settings(design)
-    found = rate(design.pair(), design.torque, design.speed, rating)
-    return found, thermal_rating(found, design.torque, design.speed, rating), rating
+def rated():
+    """Of the pair of the example."""
+    oil = replace(STAGE_3.rating.lubricant, fzg_stage=real(14.0), micropitting_test_film=real(0.102))
+    rating = replace(STAGE_3.rating, lubricant=oil)
+    return rated_by(STAGE_3), thermal_rating(rated_by(STAGE_3), STAGE_3.torque, STAGE_3.speed, rating), rating
 
 
 def published():
@@ -49,8 +47,12 @@ def published():
             yield title, symbol, printed.split(" / "), here.strip("* ").split(" / "), here.endswith("*"), unit
 
 
-def test_the_guide_lays_the_report_of_the_design_file_beside_the_published_one(rated):
-    chain = report.rows(*rated)
+@pytest.mark.slow
+def test_the_guide_lays_the_report_of_the_design_file_beside_the_published_one():
+    design = load_design(EXAMPLE)
+    rating = design.tables["rating"].settings(design)
+    found = rate(design.pair(), design.torque, design.speed, rating)
+    chain = report.rows(found, thermal_rating(found, design.torque, design.speed, rating), rating)
     wrong, seen = [], 0
     for title, symbol, printed, here, marked, unit in published():
         key = next(name for name in chain if name.lower() == title)
@@ -81,27 +83,38 @@ def test_safeties_come_first_with_what_is_required(rated):
     assert part.data["flank"]["sigma_H0"]["unit"] == "MPa" and "mesh" in part.data["load_factors"]["K_v"]
 
 
-def test_unknown_is_a_dash_and_no_number(design, rated):
-    found, _, rating = rated
-    bare = changed(rating, lubricant=changed(rating.lubricant, fzg_stage=None, micropitting_test=None))
-    thermal = thermal_rating(found, design.torque, design.speed, bare)
-    rows = {row[0]: row for row in report.safety_table(found, thermal, bare).rows}
+def test_unknown_is_a_dash_and_no_number(rated):
+    found, thermal, rating = rated
+    unknown = jnp.asarray(np.nan)
+    flash, film = (replace(of, safety=unknown) for of in (thermal.flash, thermal.micropitting))
+    thermal = replace(thermal, flash=flash, micropitting=film)
+    rows = {row[0]: row for row in report.safety_table(found, thermal, rating).rows}
     assert rows["S_B, scuffing, flash temperature"][1] == rows["S_lambda, micropitting, method B"][1] == "-"
     assert rows["S_B, scuffing, flash temperature"][-1] == ""
-    assert report.summary(found, thermal, bare)["safeties"]["S_B"]["mesh"] is None
-    lines = {line[1]: line for line in report.lines(found, thermal, bare) if line[0] == "losses"}
+    assert report.summary(found, thermal, rating)["safeties"]["S_B"]["mesh"] is None
+    lines = {line[1]: line for line in report.lines(found, thermal, rating) if line[0] == "losses"}
     assert lines["P_VZ0"][3] == "" and lines["P_VZ0"][-1] == "estimate"
 
 
-def test_spectrum_tables_sum_to_the_damage(design, rated):
-    rating = rated[-1]
-    loads = LoadSpectrum([200e3, 150e3, 40e3], [0.1, 0.2, 0.7], speeds=[1165.9] * 3)
-    found = rate(design.pair(), design.torque, design.speed, replace(rating, loads=loads))
-    load, stressed = report.spectrum_tables(found.spectrum)
-    assert [len(row) for row in load.rows] == [8] * 3 and [len(row) for row in stressed.rows] == [9] * 3
-    damage = [sum(float(row[place]) for row in stressed.rows) for place in (4, 8)]
-    np.testing.assert_allclose(damage, found.bending.damage, atol=2e-4)
-    assert float(found.bending.damage[0]) > 0.1 and "U_F" in stressed.note
+def test_spectrum_tables_sum_to_the_damage(rated):
+    bins, stress = jnp.array([3.0, 2.0, 1.0]), jnp.array([[900.0, 600.0, 300.0], [800.0, 500.0, 200.0]])
+    factors = jax.tree.map(lambda number: jnp.stack([number] * 3), rated[0].factors)
+    damage = stress / 4000
+    spectrum = Spectrum(bins, bins, 1e6 * stress, factors, stress, stress, damage, damage, bins[:2], bins[:2])
+    load, stressed = report.spectrum_tables(spectrum)
+    assert load.rows[0] == ("1", "3", "3", "900", "800", "1.092", "1.150", "1.069")
+    assert [row[2] for row in stressed.rows] == ["0.2250", "0.1500", "0.0750"]
+    assert "U_F 0.4500 / 0.3750" in stressed.note and len(stressed.rows[0]) == 9
+
+
+def test_page_workbook_and_lines(rated, tmp_path):
+    part = report.part(*rated, "unmodified")
+    write_report(tmp_path / "report.html", "stage 3", "rating", [], part.chapters)
+    page = (tmp_path / "report.html").read_text("utf-8")
+    assert "sigma_HG" in page and "S_lambda, micropitting, method B" in page
+    write_tables(tmp_path / "rating.xlsx", [("design file", "small")], part.chapters[0].tables)
+    assert (tmp_path / "rating.xlsx").read_bytes().startswith(b"PK")
+    assert part.lines[0][:3] == ("table", "symbol", "meaning") and all(len(line) == 7 for line in part.lines)
 
 
 SMALL = """
@@ -136,23 +149,15 @@ root_roughness_rz = 10.0
 """
 
 
-def test_an_analysis_writes_the_rating_into_all_its_files(tmp_path):
+@pytest.mark.slow
+def test_an_analysis_has_the_rating_and_both_ways_to_share_the_load(tmp_path):
     path = tmp_path / "small.toml"
     path.write_text(SMALL)
     design = load_design(path)
     cycle = jg.solve(jg.prepare(design.pair(), resolution=LINE), OperatingPoint(20.0, 1000.0))
-    given = dict.fromkeys(ComparisonResult.__dataclass_fields__)
-    result = ComparisonResult(
-        **{**given, "design": design, "evaluations": {"unmodified": SimpleNamespace(cycle=cycle)}}
-    )
-    part = result.parts["rating"]
-    write_report(tmp_path / "report.html", "small", "rating", [], part.chapters)
-    page = (tmp_path / "report.html").read_text("utf-8")
-    assert "sigma_HG" in page and re.search(r"S_lambda, micropitting, method B", page)
-    write_tables(tmp_path / "rating.xlsx", [("design file", "small")], part.chapters[0].tables)
-    assert (tmp_path / "rating.xlsx").read_bytes().startswith(b"PK")
-    lines = [*csv.reader(",".join(f'"{cell}"' for cell in line) for line in part.lines)]
-    assert lines[0][:3] == ["table", "symbol", "meaning"] and all(len(line) == 7 for line in lines)
+    given: dict[str, Any] = dict.fromkeys(ComparisonResult.__dataclass_fields__)
+    given |= {"design": design, "evaluations": {"unmodified": SimpleNamespace(cycle=cycle)}}
+    part = ComparisonResult(**given).parts["rating"]
     # the quantities of both ways to share the load are near each other, and never the same number
     numbers = {
         name: float(quantity_named(design, "optimize.objective", name)(cycle))
@@ -163,12 +168,13 @@ def test_an_analysis_writes_the_rating_into_all_its_files(tmp_path):
     for kind in ("scuffing", "micropitting"):
         ratio = numbers[f"rated_{kind}_safety"] / numbers[f"local_{kind}_safety"]
         assert 0.5 < ratio < 2.0 and ratio != 1.0
-    with pytest.raises(DesignFileError, match=r'"no_load_loss_power" needs lubricant.pinion_immersion or'):
-        quantity_named(design, "optimize.objective", "no_load_loss_power")
 
 
 def test_what_rates_nothing_is_refused(tmp_path):
     path = tmp_path / "small.toml"
+    path.write_text(SMALL)
+    with pytest.raises(DesignFileError, match=r'"no_load_loss_power" needs lubricant.pinion_immersion or'):
+        quantity_named(load_design(path), "optimize.objective", "no_load_loss_power")
     path.write_text(SMALL.partition("[rating.pinion]")[0])
     with pytest.raises(DesignFileError, match=r"lubricant.fzg_stage: has no effect without \[rating\]"):
         load_design(path)

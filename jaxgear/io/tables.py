@@ -102,8 +102,8 @@ class FurtherTable(FileTable):
         """
         return ()
 
-    def part(self, design: Any, name: str, cycle: MeshCycle) -> Any:
-        """What the table adds to the result of an analysis, a `report.Part`; by default None.
+    def part(self, design: Any, name: str, cycle: MeshCycle) -> object:
+        """Tables, chapters and data that the table adds to an analysis, a `report.Part`; by default None.
 
         Args:
             design: the `DesignFile`.

@@ -49,11 +49,16 @@ def _rated(analysis: Analysis, rating: Rating) -> PairRating:
         rating,
         path=cycle.kinematics.path_of_contact,
         face_load_factor=over_several_slices(face_load_factor, cycle),
-        tip_relief=jnp.min(ends_relief(analysis)),
+        tip_relief=ends_relief(analysis),
     )
 
 
-def ends_relief(analysis: Analysis) -> Float[Array, " gears"]:
+def ends_relief(analysis: Analysis) -> Scalar:
+    """C_a [um]: the smaller of those of both tips."""
+    return jnp.min(tip_reliefs(analysis))
+
+
+def tip_reliefs(analysis: Analysis) -> Float[Array, " gears"]:
     """C_a of both tips [um]: C_a1 + C_f2 and C_a2 + C_f1, what the flanks give way at the ends E and A of the path."""
     cycle = analysis.cycle
     path = cycle.kinematics.path_of_contact

@@ -58,8 +58,8 @@ def thermal_rating(
         raise ValueError("scuffing, micropitting and losses need the lubricant")
     dtype = found.tangential_force.dtype
     relief = tip_relief if rating.tip_relief is None else rating.tip_relief
-    numbers = (jnp.asarray(each, dtype) for each in (torque, speed))
-    return _thermal(found, *numbers, rating, jnp.broadcast_to(jnp.asarray(relief, dtype), (2,)))
+    load, turns = jnp.asarray(torque, dtype), jnp.asarray(speed, dtype)
+    return _thermal(found, load, turns, rating, jnp.broadcast_to(jnp.asarray(relief, dtype), (2,)))
 
 
 @program

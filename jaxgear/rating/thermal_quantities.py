@@ -15,7 +15,7 @@ from ..metrics.safety import micropitting_safety, scuffing_safety
 from ..numerics import changed
 from ..numerics.reductions import Min
 from .micropitting import material_factor, permissible_film_thickness
-from .quantities import ends_relief, rating_of
+from .quantities import rating_of, tip_reliefs
 from .scuffing import scuffing_temperature
 from .settings import Rating
 from .thermal import ThermalRating, thermal_rating
@@ -38,7 +38,7 @@ NEEDED: dict[str, tuple[tuple[str, ...], ...]] = {
 
 
 def missing(name: str, lubricant: Lubricant | None) -> str:
-    """What a lubricant lacks for a quantity, in words; "" where nothing."""
+    """Fields that a lubricant lacks for a quantity, in words; "" where none."""
     for several in NEEDED.get(name, ()):
         if all(getattr(lubricant, each, None) is None for each in several):
             return " or ".join(f"lubricant.{each}" for each in several)
@@ -51,7 +51,7 @@ def thermal_of(analysis: Analysis, rating: Rating) -> ThermalRating:
     def worked_out() -> ThermalRating:
         found, speed = rating_of(analysis, rating), analysis.operating_point.speed
         assert speed is not None
-        return thermal_rating(found, analysis.cycle.torque, speed, rating, ends_relief(analysis))
+        return thermal_rating(found, analysis.cycle.torque, speed, rating, tip_reliefs(analysis))
 
     return analysis.once(rating, "thermal", worked_out)
 

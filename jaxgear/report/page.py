@@ -148,7 +148,7 @@ class Chapter:
 
 @dataclass(frozen=True)
 class Part:
-    """What a table of a design file adds to the result of an analysis.
+    """Tables, chapters and data that a table of a design file adds to the result of an analysis.
 
     Attributes:
         tables: to be read first, after those of the designs.

@@ -107,12 +107,12 @@ class ComparisonResult(AbstractStudyResult):
 
     @cached_property
     def parts(self) -> dict[str, Part]:
-        """What tables of the file add to the main design, by their names."""
+        """Parts that tables of the file add to the result for the main design, by their names."""
         name = side_by_side.main_name(self.evaluations)
         cycle = self.evaluations[name].cycle
         tables = {key: each for key, each in self.design.tables.items() if isinstance(each, FurtherTable)}
         found = {key: each.part(self.design, name, cycle) for key, each in tables.items()}
-        return {key: each for key, each in found.items() if each is not None}
+        return {key: each for key, each in found.items() if isinstance(each, Part)}
 
     def figures(self) -> Iterator[Figure]:
         """Designs, and their scatter over manufactured gears."""
