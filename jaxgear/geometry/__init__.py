@@ -10,8 +10,8 @@ Coordinates and signs used everywhere:
 - `path` s is the position along the line of action from the pitch point [mm], positive towards the pinion tip (recess):
   rho_pinion = rho_C,pinion + s, rho_wheel = rho_C,wheel - s;
 - `phase` psi counts base pitches, psi = 0 with the reference pair at the pitch point: s = psi p_b;
-- helical gears run in their transverse section; y from the middle of the face its contact lies y tan(beta_b) ahead on
-  the path: s = psi p_bt + y tan(beta_b).
+- helical gears run in their transverse section; the contact at the face coordinate y lies y tan(beta_b) ahead on the
+  path: s = psi p_bt + y tan(beta_b).
 """
 
 from . import material as _material

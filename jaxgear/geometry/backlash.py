@@ -1,4 +1,4 @@
-"""Pairs made for a backlash, as a drawing or a specification names it."""
+"""Gear pairs with a specified backlash."""
 
 from dataclasses import replace
 from typing import Literal
@@ -16,7 +16,7 @@ Scalar = Float[Array, ""]
 By = Literal["both", "pinion", "wheel", "center_distance"]
 
 _BY = "both", "pinion", "wheel", "center_distance"
-# By how much the other numbers may leave more than the backlash [um], which is rounded to a micrometre.
+# Tolerance by which the other numbers may leave more than the specified backlash [um]: it is rounded to a micrometre.
 _ROUNDED = 1.0
 
 
@@ -29,24 +29,24 @@ def pair_with_backlash(
     axial_offset: Given = 0.0,
     by: By = "both",
 ) -> GearPair:
-    """A pair with a given play between its unloaded, unmodified flanks, in the middle of their tolerances.
+    """Gear pair with a given backlash of the unloaded, unmodified flanks, at the middle of the tolerances.
 
-    Normal to the flanks that is the play of the centre distance, less cos(normal pressure angle) times both mean tooth
-    thickness allowances (ISO 21771).
+    The normal backlash is the backlash due to the centre distance, minus cos(normal pressure angle) times the sum of
+    both mean tooth thickness allowances (ISO 21771).
 
     Args:
         pinion: driving gear.
         wheel: driven gear.
-        backlash: normal backlash j_bn [um]: on the line of action of spur gears, there j_bn / cos(beta_b) of helical
-            ones.
-        center_distance: [mm]; None for the backlash-free one of the nominal tooth thicknesses.
-        axial_offset: of the middle of the wheel's face from that of the pinion's [mm].
-        by: what makes the backlash: the tooth thickness of "both" gears, thinned alike, that of the "pinion" or the
-            "wheel" alone, or the "center_distance" of the gears as they are.
+        backlash: normal backlash j_bn [um]; the backlash on the transverse line of action is j_bn / cos(beta_b).
+        center_distance: centre distance [mm]; None for the backlash-free centre distance of the nominal tooth
+            thicknesses.
+        axial_offset: offset of the middle of the wheel face from the middle of the pinion face [mm].
+        by: quantity adjusted to reach the backlash: the tooth thickness of "both" gears by the same amount, of the
+            "pinion" or of the "wheel" alone, or the "center_distance".
 
     Raises:
-        ValueError: for less backlash than the other numbers leave, a centre distance that is given and wanted, and what
-            `GearPair` refuses.
+        ValueError: if the other numbers leave more backlash than specified, if `center_distance` is both given and to
+            be adjusted, and for all errors of `GearPair`.
     """
     if by not in _BY:
         raise ValueError(f"by = {by!r} must be one of {', '.join(_BY)}")
@@ -82,7 +82,7 @@ def _play(pinion: Gear, wheel: Gear, center_distance: Scalar | None) -> Scalar:
 
 @program
 def _distance(pinion: Gear, wheel: Gear, backlash: Scalar) -> Scalar:
-    """Centre distance [mm] that leaves a backlash."""
+    """Centre distance [mm] at which two gears have a backlash [um]."""
     both = pinion.base_radius + wheel.base_radius
     opened = 0.5e-3 * (backlash + thickening(pinion, wheel)) / both
     return both / jnp.cos(pressure_angle_of(backlash_free_involute(pinion, wheel) + opened))

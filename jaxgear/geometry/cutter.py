@@ -1,7 +1,7 @@
-"""Generation by a pinion-type cutter: how it rolls with the gear, and where the rounding of its tip is.
+"""Generation by a pinion-type cutter: rolling with the gear, and position of its tip rounding.
 
-The cutter is a gear of the same basic rack; it rolls without backlash with the gear that it cuts. The numbers may be
-signed: those of an internal gear are negative, as in ISO 21771.
+The cutter is a gear of the same basic rack; it rolls without backlash with the gear that it cuts. Tooth numbers may be
+signed: they are negative for an internal gear, as in ISO 21771.
 """
 
 from typing import Any, NamedTuple
@@ -31,7 +31,7 @@ class Cutter(NamedTuple):
         center_radius: radius c_0 = r_a0 - rho_a0 of the rounding's centre [mm].
         gap_angle: angle at the cutter's axis from the middle of its space to the centre of the rounding [rad]. The
             centre lies on the involute that is parallel to the flank, at the distance rho_a0 inside of the tooth.
-        pitch_angle: half a pitch of the cutter [rad]: what `gap_angle` may be at most.
+        pitch_angle: half the angular pitch of the cutter, upper limit of `gap_angle` [rad].
     """
 
     tangent: Number
@@ -67,9 +67,9 @@ class Cutter(NamedTuple):
 
     @property
     def line_length(self) -> Number:
-        """(r_b + r_b0) tan(alpha_w0), between both base circles on the line of action [mm].
+        """Length of the line of action between both base circles, (r_b + r_b0) tan(alpha_w0) [mm].
 
-        It is the roll length of the gear that the cutter touches at its own base circle: its involute ends there.
+        It is the roll length of the gear at which the base circle of the cutter, the end of its involute, touches.
         """
         return (self.gear_base_radius + self.base_radius) * self.tangent
 
@@ -97,14 +97,14 @@ def rolling(
     height: Number,
     radius: Number,
 ) -> Cutter:
-    """The cutter of a spur gear.
+    """Cutter in mesh with a spur gear.
 
     Args:
         teeth, cutter_teeth: numbers of teeth z and z_0.
-        module: [mm].
-        pressure_angle: of the basic rack [deg].
+        module: module [mm].
+        pressure_angle: pressure angle of the basic rack [deg].
         generating_shift, cutter_shift: profile shift coefficients x_E of the gear and x_0 of the cutter.
-        height, radius: h_a0 and rho_a0, coefficients of the module.
+        height, radius: addendum h_a0 and tip radius rho_a0 of the cutter, in modules.
     """
     of = _library(module)
     alpha = of.deg2rad(pressure_angle)
@@ -136,9 +136,10 @@ def rolling(
 
 
 def full_rounding(cutter_teeth: Number, pressure_angle: Number, cutter_shift: Number, height: Number) -> Number:
-    """Radius that rounds the whole tip of the cutter, coefficient of the module; negative of a pointed tooth.
+    """Full tip radius of the cutter, in modules; negative for a pointed tooth.
 
-    Where the centre of that arc were inside the base circle, it is the radius whose centre is there.
+    If the centre of the full radius would lie inside the base circle, the radius with its centre on the base circle is
+    returned.
     """
     of = _library(cutter_teeth)
     alpha = of.deg2rad(pressure_angle)

@@ -22,26 +22,26 @@ _MOST_HELIX_ANGLE = 45.0
 # these limits, which also hold every basic rack in use (ISO 53, AGMA fine pitch, stub and high-contact-ratio racks).
 _PRESSURE_ANGLES = 10.0, 35.0
 _RACK_HEIGHTS = 0.5, 2.0
-# The wind-up of the ring grows with the square of root over bore diameter: below this share of the root diameter no
-# bore passes a torque on that the teeth could carry, and the number is a slip.
+# The wind-up of the ring grows with the square of root over bore diameter: a bore below this share of the root diameter
+# cannot carry the torque of the teeth, and the number is an input error.
 _LEAST_BORE = 0.02
 # of tip edges without a radius [modules]
 _USUAL_EDGE, _LEAST_EDGE = 0.05, 1e-3
 # of ISO 53 profile A, and what the rounding of its digits is worth, coefficients of the module
 _ROOT_RADIUS, _RACK_ACCURACY = 0.38, 1e-4
-# by how much the tip form circle may lie outside the tip circle [mm], which a drawing rounds
+# tolerance by which the tip form circle may lie outside the tip circle [mm]: drawings round both
 CHAMFER_ACCURACY = 1e-3
-# by how much, relative, a number that is given with four digits may be beyond the one that limits it
+# relative tolerance of a limit for numbers given with four digits
 _ROUNDED = 1e-3
-# of the diameter that a cutter reaches, relative, which single precision does not resolve
+# relative tolerance of the diameter that a cutter reaches: the resolution of single precision
 _CUTTER_ACCURACY = 1e-6
 
 
 class Gear(Checked):
-    """External involute gear, spur or helical, every number a differentiable leaf.
+    """External involute gear, spur or helical; every number is a differentiable leaf.
 
-    Of helical gears module, pressure angle and all coefficients are those of the normal section (ISO 21771); radii,
-    base pitch and roll lengths are those of the transverse section, in which the mesh runs.
+    For helical gears, module, pressure angle and all coefficients refer to the normal section (ISO 21771); radii, base
+    pitch and roll lengths refer to the transverse section.
 
     Attributes:
         teeth: number of teeth z.
@@ -49,50 +49,51 @@ class Gear(Checked):
         pressure_angle: normal pressure angle of the basic rack [deg].
         profile_shift: profile shift coefficient x; positive thickens the tooth.
         face_width: face width b [mm].
-        helix_angle: beta on the reference cylinder, positive for a right hand [deg]; None, or 0, for a spur gear. Where
-            it is traced, the mesh is that of a helical pair whatever its value.
-        addendum, dedendum, root_radius: coefficients h_aP, h_fP and rho_fP of the basic rack, in modules (ISO 53). A
-            root radius that is not given is 0.38, or the full radius of the rack where its tip has no room for that.
-        protuberance: pr, by which the tool protrudes from its flanks at its tip, normal to them, coefficient of the
-            module; None for a tool without. The flank of the protuberance is inclined by half the pressure angle. It
-            takes `protuberance` less the grinding allowance off the root of the finished tooth, and d_Ff is where the
-            fillet runs out.
-        grinding_allowance: q, left on either flank for grinding, normal to it [um]; None for flanks that the tool
-            finishes. The tool is then fed less deep, and the root is not ground: the protuberance must be larger.
-        cutter_teeth: z_0 of the pinion-type (shaper) cutter that generates the tooth; None for a rack or hob. Of a
-            cutter `dedendum` is the addendum h_a0 and `root_radius` the radius rho_a0 at its tip, so that its tip
-            diameter is m (z_0 + 2 x_0 + 2 dedendum); a root radius that is not given is 0.38, or the full radius of the
-            cutter where its tip has no room for that. The root circle is at a_0 less the radius of that tip. Of spur
-            gears, and without protuberance.
-        cutter_profile_shift: x_0 of that cutter, which falls as it is sharpened; 0 where it is not given.
+        helix_angle: helix angle beta on the reference cylinder, positive for a right hand [deg]; None, or 0, for a spur
+            gear. A traced helix angle gives the mesh of a helical pair, whatever its value.
+        addendum, dedendum, root_radius: coefficients h_aP, h_fP and rho_fP of the basic rack, in modules (ISO 53). The
+            default root radius is 0.38, or the full radius of the rack if its tip has no room for 0.38.
+        protuberance: protuberance pr of the tool, by which its tip stands out from its flanks, normal to them, in
+            modules; None for a tool without protuberance. The flank of the protuberance is inclined by half the
+            pressure angle. The undercut of the finished tooth is `protuberance` minus the grinding allowance; the root
+            form diameter d_Ff is at the end of the fillet.
+        grinding_allowance: grinding allowance q on each flank, normal to it [um]; None for flanks finished by the tool.
+            The tool is fed less deep by it, and the root is not ground: the protuberance must be larger.
+        cutter_teeth: number of teeth z_0 of the pinion-type (shaper) cutter that generates the tooth; None for a rack
+            or hob. With a cutter, `dedendum` is its addendum h_a0 and `root_radius` its tip radius rho_a0; its tip
+            diameter is m (z_0 + 2 x_0 + 2 dedendum). The default tip radius is 0.38, or the full radius of the cutter
+            if its tip has no room for 0.38. The root circle radius is a_0 minus the tip radius r_a0 of the cutter. Only
+            for spur gears without protuberance.
+        cutter_profile_shift: profile shift coefficient x_0 of the cutter, which decreases with sharpening; 0 by
+            default.
         tip_diameter: tip diameter d_a [mm]; None for m (z / cos(beta) + 2 x + 2 addendum).
         bore_diameter: diameter at which the body is rigidly fixed [mm]; None for half the root diameter, which `str`
-            prints. For an integral shaft give the shaft's diameter beside the gear. The body is a plane ring: without a
+            prints. For an integral shaft give the shaft diameter next to the gear. The body is a plane ring: without a
             fixed circle its wind-up has no limit.
-        rim_thickness: s_R, radial thickness of the rim from the root circle to its inside [mm], of a gear with a web;
-            None for a solid body. Together with `web_thickness` it is used by C_R of `iso_stiffness` alone. The
-            contact analysis has a plane ring that is rigid inside of `bore_diameter`: given the inner diameter of the
-            rim it stands for a rim on a web that does not bend, and no ring stands for a web that does.
-        web_thickness: b_s, axial thickness of the web [mm]; None for a solid body.
-        tip_form_diameter: d_Fa, where chamfer or rounding of the tip begins and the active flank ends [mm] (ISO 21771);
-            None for a flank up to the tip diameter. The path of contact ends there, corner contact is with the edge
-            there, and tip reliefs count from it. Chamfers have 45 degrees and must leave some of the tip land.
-        tip_edge_radius: radius of the edge between flank and tip cylinder or chamfer [mm], used for the pressure of
-            corner contact only; None for 0.05 modules. It is at most half the thickness of the tooth where the active
-            flank ends: the default gives way to it, which `str` prints.
-        tooth_thickness_allowance: E_sns, upper allowance of the tooth thickness (ISO 21771), by which the tooth is
-            thicker than the rack makes it, as an arc on the reference cylinder, normal to the tooth [um]: negative for
-            backlash, half of it on either flank. The tool is fed deeper for it: root circle and fillet are those of
-            `generating_profile_shift`, and the thinner tooth is softer. The tip circle is that of the profile shift.
-        tooth_thickness_tolerance: T_sn, from the upper down to the lower allowance E_sni = E_sns - T_sn [um]; the tooth
-            is that in the middle of both.
+        rim_thickness: rim thickness s_R from the root circle to the inside of the rim, of a gear with a web [mm]; None
+            for a solid body. Together with `web_thickness` it is used only by C_R of `iso_stiffness`. The contact
+            analysis models the body as a plane ring, rigid inside `bore_diameter`: the inner diameter of the rim as
+            `bore_diameter` models a rim on a rigid web; a flexible web is not modelled.
+        web_thickness: axial thickness b_s of the web [mm]; None for a solid body.
+        tip_form_diameter: tip form diameter d_Fa, where the active flank ends and the tip chamfer or rounding begins
+            [mm] (ISO 21771); None for the tip diameter. It is the end of the path of contact, the edge of corner
+            contact, and the origin of tip reliefs. Chamfers have 45 degrees and must leave a part of the tip land.
+        tip_edge_radius: radius of the edge between flank and tip cylinder or chamfer [mm], used only for the pressure
+            of corner contact; None for 0.05 modules, reduced, as `str` prints, to half the tooth thickness at the end
+            of the active flank if that is smaller. A given radius must not exceed that limit.
+        tooth_thickness_allowance: upper tooth thickness allowance E_sns (ISO 21771), arc on the reference cylinder,
+            normal to the tooth [um]; negative for a thinner tooth, half of it on each flank. The tool is fed deeper for
+            it: root circle and fillet follow from `generating_profile_shift`, and the thinner tooth is more compliant.
+            The tip circle follows from the profile shift.
+        tooth_thickness_tolerance: tooth thickness tolerance T_sn, from the upper to the lower allowance
+            E_sni = E_sns - T_sn [um]; the analysed tooth lies in the middle.
         material: elastic constants.
 
     Raises:
         ValueError: for a number outside its range or an array of numbers, a pointed tooth, a tip inside the base
             circle, a tip form circle outside the tip circle or inside the base circle, a bore that reaches the root
-            circle or is less than 2 % of it, or a cutter that is pointed or whose involute does not reach to the tip of
-            the gear; the message names the parameter, its value and what is allowed. While being traced only shapes are
+            circle or is less than 2 % of it, or a cutter that is pointed or whose involute does not reach the tip of
+            the gear; the message names the parameter, its value and the allowed range. Of a traced gear only shapes are
             checked: see `margins` of the pair.
     """
 
@@ -148,7 +149,7 @@ class Gear(Checked):
             raise ValueError(fault)
 
     def _check_cutter(self) -> None:
-        """Refuses what does not go with a cutter; its profile shift is a number from here on."""
+        """Raise for parameters that exclude a cutter, and set the default of its profile shift."""
         if self.cutter_teeth is None:
             if self.cutter_profile_shift is not None:
                 raise ValueError("Gear: cutter_teeth: missing, cutter_profile_shift needs it")
@@ -187,38 +188,38 @@ class Gear(Checked):
 
     @property
     def is_spur(self) -> bool:
-        """Whether the gear is known to be a spur gear: without helix angle, or with one of zero that is not traced."""
+        """True for a gear without helix angle, or with a concrete helix angle of zero."""
         angle = None if self.helix_angle is None else concrete(self.helix_angle)
         return self.helix_angle is None or (angle is not None and not np.any(angle))
 
     @property
     def helix_cosine(self) -> Real:
-        """cos(beta)."""
+        """Cosine of the helix angle, cos(beta)."""
         if self.helix_angle is None:
             return jnp.ones_like(self.module)
         return jnp.cos(jnp.deg2rad(self.helix_angle))
 
     @property
     def transverse_module(self) -> Real:
-        """m_t = m_n / cos(beta) [mm]."""
+        """Transverse module m_t = m_n / cos(beta) [mm]."""
         return _transverse_module(self)
 
     @property
     def transverse_pressure_angle(self) -> Real:
-        """alpha_t, with tan(alpha_t) = tan(alpha_n) / cos(beta) [rad]."""
+        """Transverse pressure angle alpha_t [rad], tan(alpha_t) = tan(alpha_n) / cos(beta)."""
         normal = jnp.deg2rad(self.pressure_angle)
         return normal if self.helix_angle is None else jnp.arctan(jnp.tan(normal) / self.helix_cosine)
 
     @property
     def base_helix_angle(self) -> Real:
-        """beta_b, with sin(beta_b) = sin(beta) cos(alpha_n) [rad], positive for a right hand."""
+        """Base helix angle beta_b [rad], sin(beta_b) = sin(beta) cos(alpha_n), positive for a right hand."""
         if self.helix_angle is None:
             return jnp.zeros_like(self.module)
         return jnp.arcsin(jnp.sin(jnp.deg2rad(self.helix_angle)) * jnp.cos(jnp.deg2rad(self.pressure_angle)))
 
     @property
     def virtual_teeth(self) -> Real:
-        """z_n = z / (cos(beta_b)^2 cos(beta)): teeth of the spur gear that the normal section resembles."""
+        """Virtual number of teeth z_n = z / (cos(beta_b)^2 cos(beta)), of the equivalent spur gear."""
         return self.teeth / (jnp.cos(self.base_helix_angle) ** 2 * self.helix_cosine)
 
     @property
@@ -228,7 +229,7 @@ class Gear(Checked):
 
     @property
     def base_radius(self) -> Real:
-        """[mm]"""
+        """Base radius r_b [mm]."""
         return self.pitch_radius * jnp.cos(self.transverse_pressure_angle)
 
     @property
@@ -238,7 +239,7 @@ class Gear(Checked):
 
     @property
     def tip_radius(self) -> Real:
-        """[mm]"""
+        """Tip radius r_a [mm]."""
         if self.tip_diameter is not None:
             return 0.5 * self.tip_diameter
         return _rack_tip_radius(self)
@@ -250,33 +251,34 @@ class Gear(Checked):
 
     @property
     def bore_radius(self) -> Real:
-        """[mm]"""
+        """Bore radius [mm], half the root radius by default."""
         return 0.5 * self.root_circle_radius if self.bore_diameter is None else 0.5 * self.bore_diameter
 
     @property
     def mean_tooth_thickness_allowance(self) -> Real:
-        """Middle of upper and lower allowance, (E_sns + E_sni) / 2 [um]: that of the tooth that is analysed."""
+        """Mean tooth thickness allowance A_sn = (E_sns + E_sni) / 2 [um], used for the analysed tooth."""
         return _mean_allowance(self)
 
     @property
     def generating_profile_shift(self) -> Real:
-        """x_E = x + A_sn / (2 m_n tan(alpha_n)) + q / (m_n sin(alpha_n)), at which the tool cuts (ISO 21771).
+        """Generating profile shift coefficient x_E = x + A_sn / (2 m_n tan(alpha_n)) + q / (m_n sin(alpha_n)).
 
-        A_sn is the mean tooth thickness allowance and q the grinding allowance.
+        A_sn is the mean tooth thickness allowance and q the grinding allowance (ISO 21771).
         """
         return _generating_profile_shift(self)
 
     @property
     def cutter(self) -> Cutter | None:
-        """The cutter in mesh with the gear; None of a gear that a rack generates."""
+        """Cutter in mesh with the gear; None for a gear generated by a rack."""
         return _cutter(self)
 
     @property
     def cutter_room(self) -> Real | None:
-        """Smallest of four lengths [mm], none of them negative if the cutter can be used; None without a cutter.
+        """Smallest margin of the cutter [mm], not negative if the cutter can be used; None without a cutter.
 
-        The radius of the roundings of its tip, half the width between them, the height of their centres above its base
-        circle, and the roll length beyond the gear's tip form circle that its involute reaches.
+        The four margins are its tip radius, half the tip width between the roundings, the height of the centre of the
+        rounding above its base circle, and the roll length by which its involute reaches beyond the tip form circle of
+        the gear.
         """
         cutter = _cutter(self)
         if cutter is None:
@@ -303,18 +305,18 @@ class Gear(Checked):
 
     @property
     def tip_roll_length(self) -> Real:
-        """Roll length where the active flank ends at the tip [mm]; 0 for a traced gear's inside the base circle."""
+        """Roll length at the tip form circle [mm]; 0 if that circle of a traced gear lies inside the base circle."""
         return safe_sqrt(self.tip_form_radius**2 - self.base_radius**2)
 
     @property
     def tip_land(self) -> Real:
-        """Thickness of the tooth at the tip as an arc [mm], before it is chamfered; not positive if it is pointed."""
+        """Tooth thickness at the tip circle as an arc, without chamfer [mm]; zero or negative for a pointed tooth."""
         rho = safe_sqrt(self.tip_radius**2 - self.base_radius**2)
         return 2 * self.tip_radius * half_tooth_angle(self, rho)
 
     @property
     def tip_half_thickness(self) -> Real:
-        """Half the thickness of the tooth as an arc where the active flank ends [mm], the room for the tip edge."""
+        """Half the tooth thickness at the tip form circle as an arc [mm], upper limit of the tip edge radius."""
         return self.tip_form_radius * half_tooth_angle(self, self.tip_roll_length)
 
     @property
@@ -327,7 +329,7 @@ class Gear(Checked):
 
     @property
     def tip_height(self) -> Real:
-        """Radial height of the tip above base and root circle [mm], the smaller of the two."""
+        """Radial height of the tip above the larger one of base circle and root circle [mm]."""
         return self.tip_radius - jnp.maximum(self.base_radius, self.root_circle_radius)
 
     @property
@@ -389,10 +391,10 @@ def tool_name(gear: Gear) -> str:
 
 
 def with_diameters(gear: Gear) -> Gear:
-    """The gear with numbers in place of None for the diameters of tip and bore: gears of one tree structure.
+    """Gear with explicit tip and bore diameters in place of None, so that all gears have one tree structure.
 
-    A compiled program then serves gears that give them and gears that do not. A gear with numbers that are being traced
-    is left as it is: its diameters follow them.
+    A compiled program then serves gears with and without given diameters. A traced gear is returned unchanged: its
+    diameters follow from its other numbers.
     """
     names = [name for name in ("tip_diameter", "bore_diameter") if getattr(gear, name) is None]
     if not names or any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves(gear)):
@@ -403,10 +405,10 @@ def with_diameters(gear: Gear) -> Gear:
 
 
 def check_spur(*gears: Gear) -> None:
-    """Refuses helical gears, for what covers spur gears alone.
+    """Raise for helical gears, in functions for spur gears only.
 
     Raises:
-        ValueError: for a gear with a helix angle that is not known to be zero.
+        ValueError: for a gear whose helix angle is traced or not zero.
     """
     for gear in gears:
         if not gear.is_spur:
@@ -417,7 +419,7 @@ def check_spur(*gears: Gear) -> None:
 
 
 def virtual_gear(gear: Gear) -> Gear:
-    """The spur gear that the normal section of a helical one resembles, with teeth of the same height (ISO 6336-3)."""
+    """Virtual spur gear of the normal section of a helical gear, with the same tooth height (ISO 6336-3)."""
     grown = 0.5 * gear.module * gear.virtual_teeth - gear.pitch_radius
     diameters = {"tip_diameter": 2 * (gear.tip_radius + grown), "bore_diameter": 2 * (gear.bore_radius + grown)}
     if gear.tip_form_diameter is not None:
@@ -426,7 +428,7 @@ def virtual_gear(gear: Gear) -> Gear:
 
 
 def shape_faults(gear: Gear) -> tuple[str, ...]:
-    """Why a gear of concrete numbers cannot be cut, one line each; empty if it can, or while it is being traced."""
+    """Reasons why a gear of concrete numbers cannot be cut, one line each; empty if it can, and for traced gears."""
     shape = _shape(with_diameters(gear))
     if any(isinstance(number, jax.core.Tracer) for number in shape):
         return ()
@@ -466,7 +468,7 @@ def shape_faults(gear: Gear) -> tuple[str, ...]:
 
 
 def _tip_in_radians(gear: Gear) -> str | None:
-    """The fault of a helix angle in radians, told by the tip diameter that it makes; None where it is not that."""
+    """Message for a helix angle given in radians, detected by the resulting tip diameter; None otherwise."""
     meant = degrees_meant(gear)
     if meant is None:
         return None
@@ -479,7 +481,7 @@ def _tip_in_radians(gear: Gear) -> str | None:
 
 
 def degrees_meant(gear: Gear) -> float | None:
-    """A concrete helix angle [deg] that is small enough to be one in radians, as if it were one; else None."""
+    """Helix angle converted from radians to degrees if the concrete value is small enough to be radians; else None."""
     angle = 0.0 if gear.helix_angle is None else float(gear.helix_angle)
     return float(np.rad2deg(angle)) if 0 < abs(angle) <= np.deg2rad(_MOST_HELIX_ANGLE) else None
 
@@ -516,7 +518,7 @@ def _concrete_tool(gear: Gear) -> tuple[np.ndarray, ...] | None:
 
 
 def _full_radius(pressure_angle: Any, dedendum: Any, cutter_teeth: Any = None, cutter_profile_shift: Any = None) -> Any:
-    """Radius that rounds the whole tip of the tool, coefficient of the module, of NumPy's or JAX's numbers.
+    """Full tip radius of the tool, in modules; computes with NumPy or JAX, depending on its arguments.
 
     The tip of a rack is pi/4 - dedendum tan(alpha) wide on either side of its centre (ISO 53).
     """
@@ -528,7 +530,7 @@ def _full_radius(pressure_angle: Any, dedendum: Any, cutter_teeth: Any = None, c
 
 
 def full_radius(gear: Gear) -> Scalar:
-    """Radius that rounds the whole tip of the tool, coefficient of the module."""
+    """Full tip radius of the tool of a gear, in modules."""
     return _full_radius(*_tool(gear))
 
 
@@ -543,7 +545,7 @@ def _usual_root_radius(gear: Gear) -> Scalar:
 
 
 def has_full_radius(gear: Gear) -> bool:
-    """Whether the fillet is known to be cut by the full radius of a tool that has no room for the usual one."""
+    """True if a concrete gear is cut by the full tip radius of a tool whose tip has no room for the usual 0.38."""
     radius, known = concrete(gear.root_radius), _concrete_tool(gear)
     if radius is None or known is None or radius.ndim:
         return False
@@ -551,7 +553,7 @@ def has_full_radius(gear: Gear) -> bool:
 
 
 def _cutter_tip_faults(gear: Gear) -> tuple[str, ...]:
-    """Why no radius rounds the tip of a cutter of concrete numbers; empty if one does."""
+    """Reasons why a cutter of concrete numbers admits no tip radius; empty if it does."""
     known = _concrete_tool(gear)
     if known is None or float(_full_radius(*known)) >= 0:
         return ()
@@ -562,7 +564,7 @@ def _cutter_tip_faults(gear: Gear) -> tuple[str, ...]:
 
 
 def _cutter_reach_faults(gear: Gear, form: float) -> tuple[str, ...]:
-    """Whether the involute of a cutter of concrete numbers ends below a tip form diameter [mm], in words."""
+    """Messages if the involute of a cutter of concrete numbers ends below a tip form diameter [mm]; else empty."""
     if gear.cutter_teeth is None:
         return ()
     # compiles nothing; face width and material may be traced

@@ -1,8 +1,8 @@
-"""Clearance between the tip of a gear and the fillet of its mate, where the tip runs below the mate's form circle.
+"""Clearance between the fillet of a gear and the tip of its mate, if the tip runs below the form circle of the gear.
 
 The tip corner of the mate passes every radius of the fillet once on its way into the tooth space, at an angle psi of
-its gear from the line of centres. Both angles, that of the corner and that of the fillet's point, are closed forms in
-the roll lengths at which the flanks touch then: no root, no table.
+the mate from the line of centres. The angles of the corner and of the point of the fillet are closed forms in the roll
+lengths at which the flanks touch: neither a root search nor a table is needed.
 """
 
 import jax.numpy as jnp

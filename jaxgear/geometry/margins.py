@@ -1,6 +1,7 @@
-"""How far two gears are from what cannot run, as numbers that an optimizer can hold, and in words.
+"""Margins of a gear pair against geometry that cannot run: numbers for an optimizer, and messages.
 
-One rule for each margin decides both: `Margins.held`. Concrete pairs are refused by it, traced ones flagged.
+`Margins.held` has one rule for each margin. A concrete pair that violates it raises an error; a traced pair gets a
+status.
 """
 
 from collections.abc import Mapping
@@ -28,10 +29,10 @@ _LEAST_DECIMALS = 2  # that drawings give
 
 
 class Accuracy(eqx.Module):
-    """Accuracy of some margins, by which they may lie below zero: that of an outline, or of single precision.
+    """Tolerances by which some margins may lie below zero: accuracy of an outline, or of single precision.
 
     Attributes:
-        pinion_form, wheel_form: roll length of the outline's accuracy at the form circle [mm].
+        pinion_form, wheel_form: accuracy of the outline at the form circle, as a roll length [mm].
         backlash: accuracy of the backlash [um].
     """
 
@@ -41,35 +42,36 @@ class Accuracy(eqx.Module):
 
 
 class Margins(Checked):
-    """Numbers that are positive where a pair can run; made by `margins`.
+    """Margins that are positive for a gear pair that can run; made by `margins`.
 
-    Each is finite and has a finite derivative for impossible gears too, so that a search finds back.
+    Every margin is finite and has a finite derivative also for gears that cannot run, so that a search can return to
+    valid gears.
 
     Attributes:
-        pinion_tip_land, wheel_tip_land: thickness of the tooth at the tip, as an arc [mm].
-        pinion_tip_height, wheel_tip_height: height of the tip above base and root circle [mm].
-        pinion_rim_thickness, wheel_rim_thickness: from the bore to the root circle [mm].
-        pinion_form_clearance, wheel_form_clearance: roll length at which the mate's tip meets the flank beyond that of
-            the form circle, where the usable involute starts [mm]. Below zero the path of contact begins at the form
-            circle, and the pair runs where the fillet is clear.
+        pinion_tip_land, wheel_tip_land: tooth thickness at the tip circle, as an arc [mm].
+        pinion_tip_height, wheel_tip_height: radial height of the tip above the larger one of base and root circle [mm].
+        pinion_rim_thickness, wheel_rim_thickness: radial distance from the bore to the root circle [mm].
+        pinion_form_clearance, wheel_form_clearance: roll length at which the tip of the mate meets the flank, minus the
+            roll length of the root form circle [mm]. If it is negative, the path of contact begins at the form circle,
+            and the pair can run if the fillet clearance is positive.
         pinion_fillet_clearance, wheel_fillet_clearance: least arc between the fillet of the gear and the tip of the
             mate [mm].
-        pinion_tip_clearance, wheel_tip_clearance: from the gear's tip to the mate's root circle on the line of
-            centres [mm].
-        contact_ratio_margin: transverse contact ratio minus 1. Helical gears run below 0 too, where the overlap ratio
-            makes up for it.
-        backlash: play between the unloaded flanks on the line of action [um], by centre distance and tooth thickness
-            allowances; without a given centre distance that of the allowances alone.
+        pinion_tip_clearance, wheel_tip_clearance: distance from the tip of the gear to the root circle of the mate on
+            the line of centres [mm].
+        contact_ratio_margin: transverse contact ratio minus 1. Helical gears can run with a negative margin if the
+            overlap ratio compensates for it.
+        backlash: backlash of the unloaded flanks on the line of action, due to centre distance and tooth thickness
+            allowances [um]; due to the allowances alone if no centre distance is given.
         base_circle_clearance: centre distance minus both base radii [mm].
-        face_overlap: width on which the faces overlap along the axis [mm].
-        base_pitch_difference: between pinion and wheel, relative, and what base helix angles miss of being opposite
-            ones [rad]. No margin: it must vanish.
-        tip_overrun: by how much a tip form circle lies outside its tip circle, the larger of both gears [mm]. No
-            margin: it must not be positive, and is zero without chamfers.
-        overlap_ratio: of the faces.
-        accuracy: by how much clearances of the form circles and backlash may lie below zero.
-        pinion_cutter_room, wheel_cutter_room: `cutter_room` of the gears [mm], at least zero up to rounding; None of a
-            gear that a rack generates.
+        face_overlap: axial width of the overlap of both faces [mm].
+        base_pitch_difference: relative difference of the base pitches of pinion and wheel, plus the deviation of the
+            base helix angles from opposite values [rad]. Not a margin: it must be zero.
+        tip_overrun: radial distance of a tip form circle outside its tip circle, the larger one of both gears [mm]. Not
+            a margin: it must not be positive, and is zero without chamfers.
+        overlap_ratio: overlap ratio of the common face.
+        accuracy: tolerances by which form clearances and backlash may lie below zero.
+        pinion_cutter_room, wheel_cutter_room: `cutter_room` of the gears [mm], at least zero up to rounding; None for a
+            gear generated by a rack.
     """
 
     pinion_tip_land: Scalar = result("mm")
@@ -97,7 +99,7 @@ class Margins(Checked):
 
     @property
     def held(self) -> dict[str, Bool[Array, "..."]]:
-        """For each margin by name whether it holds, most basic first."""
+        """True for every margin that is met, by name, the most basic margins first."""
         shape = {
             f"{side}_{name}": getattr(self, f"{side}_{name}") > 0
             for side in ("pinion", "wheel")
@@ -124,7 +126,7 @@ class Margins(Checked):
 
     @property
     def valid(self) -> Bool[Array, "..."]:
-        """Whether the pair can run: every margin holds."""
+        """True if the pair can run: all margins are met."""
         return jnp.all(jnp.stack(list(self.held.values())), axis=0)
 
 
@@ -178,7 +180,7 @@ def _apart(first: Gear, second: Gear) -> Scalar:
 
 
 def play_between(pinion: Gear, wheel: Gear, tangent: Scalar | None) -> Scalar:
-    """Play on the line of action [um] at the tangent of a working pressure angle, or where that is backlash-free.
+    """Backlash on the line of action [um] at tan(alpha_w); None for the backlash-free working pressure angle.
 
     p_b - s_1 - s_2 with the thicknesses at the base circles: 2 (r_b1 + r_b2) (inv(alpha_w) - inv(alpha_w,free)).
     """
@@ -189,12 +191,12 @@ def play_between(pinion: Gear, wheel: Gear, tangent: Scalar | None) -> Scalar:
 
 
 def thickening(pinion: Gear, wheel: Gear) -> Scalar:
-    """Play on the line of action that the tooth thickness allowances take [um]: the arcs on both base circles."""
+    """Reduction of the backlash on the line of action by tooth thickness allowances [um], arcs on both base circles."""
     return 2e3 * (pinion.base_radius * pinion.thickness_angle + wheel.base_radius * wheel.thickness_angle)
 
 
 def _form_accuracy(outline: Outline) -> Scalar:
-    """Roll length that the accuracy of the outline's radius is worth at the form circle [mm]."""
+    """Accuracy of the outline radius at the form circle, converted to a roll length [mm]."""
     base, form = outline.gear.base_radius, outline.form_roll_length
     lower = jnp.sqrt(base**2 + form**2) - _OUTLINE_ACCURACY
     return form - safe_sqrt(lower**2 - base**2)
@@ -208,7 +210,7 @@ def faults_between(
     margins: Margins,
     held: Mapping[str, Bool[Array, ""]],
 ) -> tuple[str, ...]:
-    """The margins that do not hold, in words; all numbers concrete. `held` are those of the margins."""
+    """Messages for all margins that are not met, for concrete numbers; `held` is `margins.held`."""
     faults = [
         f"{side}: {fault}" for side, gear in (("pinion", pinion), ("wheel", wheel)) for fault in shape_faults(gear)
     ]
@@ -261,7 +263,7 @@ def _backlash_fault(pinion: Gear, wheel: Gear, center_distance: Given | None) ->
 
 
 def free_distance(pinion: Gear, wheel: Gear) -> Scalar:
-    """Centre distance without backlash [mm], of the mean tooth thicknesses."""
+    """Backlash-free centre distance at the mean tooth thicknesses [mm]."""
     both = pinion.base_radius + wheel.base_radius
     return both / jnp.cos(
         pressure_angle_of(backlash_free_involute(pinion, wheel) + 0.5e-3 * thickening(pinion, wheel) / both)
@@ -269,10 +271,10 @@ def free_distance(pinion: Gear, wheel: Gear) -> Scalar:
 
 
 def rounded_by(pinion: Gear, wheel: Gear, center_distance: Given) -> float:
-    """Part of a concrete centre distance that the rounding of the given digits is worth [mm].
+    """Rounding error of a concrete centre distance due to the number of given digits [mm].
 
-    That of its own digits, and of those of both profile shifts and the helix angle: half a unit of the last one, of
-    numbers that are given to fewer than two decimals of the second.
+    It adds the rounding of the centre distance, of both profile shifts and of the helix angle: half a unit of the last
+    given decimal, at most half a unit of the second decimal.
     """
     angle = 0.0 if pinion.helix_angle is None else abs(float(pinion.helix_angle))
     shifts = _half_unit(pinion.profile_shift) + _half_unit(wheel.profile_shift)

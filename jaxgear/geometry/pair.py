@@ -1,4 +1,4 @@
-"""Two gears on their operating centre distance."""
+"""Gear pair: pinion and wheel at their operating centre distance."""
 
 import logging
 
@@ -23,22 +23,23 @@ _LEAST_OVERLAP = 1e-3
 
 
 class GearPair(Checked):
-    """Pinion (driving) and wheel (driven).
+    """Gear pair: pinion (driving) and wheel (driven).
 
     Attributes:
         pinion: driving gear.
         wheel: driven gear.
-        center_distance: operating centre distance [mm]; None for the backlash-free one of the nominal tooth
-            thicknesses, to which tooth thickness allowances add their play. A concrete one that is too small by no more
-            than the rounding of its digits and of those of profile shifts and helix angle becomes the backlash-free
-            one, with a warning of the logger "jaxgear.unusual".
-        axial_offset: of the middle of the wheel's face from that of the pinion's, positive towards positive face
-            coordinates [mm].
+        center_distance: operating centre distance [mm]; None for the backlash-free centre distance of the nominal tooth
+            thicknesses, at which tooth thickness allowances add backlash. A concrete centre distance that is too small
+            by no more than the rounding of its digits, of the profile shifts and of the helix angle is replaced by the
+            backlash-free one, with a warning of the logger "jaxgear.unusual".
+        axial_offset: offset of the middle of the wheel face from the middle of the pinion face, positive towards
+            positive face coordinates [mm].
 
     Raises:
-        ValueError: for gears that do not share module or pressure angle, helical gears of the same hand, an impossible
-            centre distance, a total contact ratio below 1, a tip that hits the mate's fillet or root circle, faces that
-            do not overlap: the first of what `explain` lists. Pairs made while being traced pass; their `margins` tell.
+        ValueError: for gears of different module or pressure angle, helical gears of the same hand, an impossible
+            centre distance, a total contact ratio below 1, a tip that hits the fillet or the root circle of the mate,
+            or faces that do not overlap; the message is the first of `explain`. Traced pairs are not checked; see their
+            `margins`.
     """
 
     pinion: Gear
@@ -64,16 +65,17 @@ class GearPair(Checked):
 
     @property
     def working_center_distance(self) -> Real:
-        """[mm]"""
+        """Operating centre distance, given or backlash-free [mm]."""
         if self.center_distance is not None:
             return self.center_distance
         return (self.pinion.base_radius + self.wheel.base_radius) / jnp.cos(self.working_pressure_angle)
 
     @property
     def backlash(self) -> Scalar:
-        """Play between the unloaded, unmodified flanks on the transverse line of action [um], j_bt: that of the centre
-        distance, and what the mean tooth thickness allowances take off both teeth. Normal to the flanks it is
-        cos(beta_b) times this.
+        """Backlash j_bt of the unloaded, unmodified flanks on the transverse line of action [um].
+
+        It is due to the centre distance and the mean tooth thickness allowances. The normal backlash is
+        cos(beta_b) times as large.
         """
         tangent = None if self.center_distance is None else jnp.tan(self.working_pressure_angle)
         return play_between(self.pinion, self.wheel, tangent)
@@ -87,9 +89,9 @@ class GearPair(Checked):
 
     @property
     def face_width(self) -> Real:
-        """Common face width [mm], on which both faces overlap: of gears that are centred the smaller of the two.
+        """Common face width [mm], on which both faces overlap; the smaller face width for centred gears.
 
-        Of faces that do not overlap it is a thousandth of the smaller one, and the pair's `face_overlap` is negative.
+        For faces that do not overlap it is a thousandth of the smaller face width, and `face_overlap` is negative.
         """
         low, high = self._common_face
         least = _LEAST_OVERLAP * jnp.minimum(self.pinion.face_width, self.wheel.face_width)
@@ -139,12 +141,12 @@ class GearPair(Checked):
 
     @property
     def coast(self) -> "GearPair":
-        """Pair whose drive flanks are the coast flanks of this one, seen in a mirror: gears of the other hand.
+        """Mirror image of the pair, whose drive flanks are the coast flanks of this pair: gears of the opposite hand.
 
-        The wheel drives on them where the pinion goes on turning as it did: under a negative torque on the pinion. The
-        amount of that torque is then the torque, and modifications are those of the coast flanks, at the same face
-        coordinates. While the gears turn on, mesh positions count backwards: contact begins at the tip of the pinion,
-        E, and ends at its root, A, so that approach and recess change places.
+        Coast flanks carry a negative torque on the pinion, without a change of the sense of rotation. Analyse the
+        mirrored pair with the absolute value of that torque and the modifications of the coast flanks, at the same face
+        coordinates. Its mesh positions run backwards in time: contact begins at the tip of the pinion, E, and ends at
+        its root, A; approach and recess are exchanged.
         """
         pinion, wheel = (
             gear if gear.helix_angle is None else changed(gear, helix_angle=-gear.helix_angle) for gear in self.gears
@@ -153,21 +155,22 @@ class GearPair(Checked):
 
     @property
     def is_spur(self) -> bool:
-        """Whether both gears are known to be spur gears."""
+        """True if both gears have no helix angle, or a concrete helix angle of zero."""
         return all(gear.is_spur for gear in self.gears)
 
     @property
     def path_slope(self) -> Real:
-        """tan(beta_b), by which contacts lie ahead on the line of action per face coordinate.
+        """Slope tan(beta_b) of the contact position on the line of action over the face coordinate.
 
-        Positive face coordinates enter the mesh first where the pinion has a right hand: it turns counterclockwise seen
-        from the positive end of the face. On the other flanks, or turning the other way, face coordinates change sign.
+        With a right-handed pinion, positive face coordinates enter the mesh first: the pinion turns counterclockwise,
+        seen from the positive end of the face. For the coast flanks, or the other sense of rotation, the sign of face
+        coordinates changes.
         """
         return jnp.tan(self.pinion.base_helix_angle)
 
     @property
     def overlap_ratio(self) -> Real:
-        """eps_beta = b |tan(beta_b)| / p_bt (ISO 21771), over the common face."""
+        """Overlap ratio eps_beta = b |tan(beta_b)| / p_bt of the common face (ISO 21771)."""
         return self.face_width * jnp.abs(self.path_slope) / self.base_pitch
 
     @property
@@ -177,13 +180,13 @@ class GearPair(Checked):
 
 
 class PairGeometry(eqx.Module):
-    """A pair by its generated teeth.
+    """Generated geometry of a gear pair.
 
     Attributes:
-        outlines: of the teeth of pinion and wheel.
+        outlines: tooth outlines of pinion and wheel.
         path_of_contact: points A to E.
-        margins: how far the pair is from what cannot run.
-        held: for each margin by name whether it holds.
+        margins: margins against geometry that cannot run.
+        held: True for every margin that is met, by name.
     """
 
     outlines: tuple[Outline, Outline]
@@ -205,18 +208,18 @@ def pair_geometry(pair: GearPair) -> PairGeometry:
 
 
 def path_of_contact(pair: GearPair, outlines: tuple[Outline, Outline] | None = None) -> PathOfContact:
-    """Path of contact of a pair, limited by tip and form circles; `outlines` of its gears where they are known."""
+    """Path of contact of a pair, limited by tip and form circles; None for `outlines` to generate them."""
     forms = None if outlines is None else (outlines[0].form_roll_length, outlines[1].form_roll_length)
     return path_between(pair.pinion, pair.wheel, pair.center_distance, forms)
 
 
 def margins(pair: GearPair) -> Margins:
-    """How far a pair is from what cannot run; finite and differentiable for impossible gears too."""
+    """Margins of a pair against geometry that cannot run; finite and differentiable also for invalid gears."""
     return pair_geometry(explicit(pair)).margins
 
 
 def explain(pair: GearPair) -> tuple[str, ...]:
-    """Why a pair cannot run, one line for each margin that does not hold; empty if it can.
+    """Reasons why a pair cannot run, one line for each margin that is not met; empty if it can run.
 
     Args:
         pair: one pair of concrete numbers, for instance a design that `jax.jit` or `jax.vmap` returned.
@@ -232,7 +235,7 @@ def explain(pair: GearPair) -> tuple[str, ...]:
 
 
 def _unrounded(pair: GearPair, center_distance: Scalar) -> Scalar:
-    """The centre distance, or the backlash-free one where it is less by no more than its digits are rounded."""
+    """Centre distance [mm], replaced by the backlash-free one if it is smaller only by the rounding of its digits."""
     known = pair_geometry(explicit(pair))
     held = known.held
     if _traced(known) or held["backlash"] or not held["base_circle_clearance"]:
@@ -262,13 +265,13 @@ def _faults(pair: GearPair) -> tuple[str, ...]:
 
 
 def explicit(pair: GearPair) -> GearPair:
-    """The pair of gears `with_diameters`, for programs that ask for their numbers and not whether they are given."""
+    """Pair with explicit diameters of both gears (`with_diameters`), so that all pairs have one tree structure."""
     pinion, wheel = map(with_diameters, pair.gears)
     return changed(pair, pinion=pinion, wheel=wheel)
 
 
 def is_even(pair: GearPair) -> bool:
-    """Whether both faces are known to be one: gears of equal width without offset, of concrete numbers."""
+    """True if both faces coincide: concrete, equal face widths without axial offset."""
     given = [concrete(each) for each in (pair.pinion.face_width, pair.wheel.face_width, pair.axial_offset)]
     if any(each is None for each in given):
         return False

@@ -1,4 +1,4 @@
-"""Where two gears meet: operating pressure angle and centre distance, points A to E, contact ratio, sliding."""
+"""Path of contact: operating pressure angle, points A to E, contact ratio, sliding."""
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -73,7 +73,7 @@ class PathOfContact(Checked):
 
 
 def reduced_radius(first: Real, second: Real) -> Real:
-    """Radius of the cylinder that touches a plane as two cylinders touch each other [mm]."""
+    """Reduced radius of curvature of two cylinders, 1 / (1 / r_1 + 1 / r_2) [mm]."""
     return first * second / (first + second)
 
 

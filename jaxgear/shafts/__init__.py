@@ -1,4 +1,4 @@
-"""Shafts, bearings and housing under a mesh: what they make of the gap over its face, and of the load there.
+"""Shafts, bearings and housing that support a mesh: gap over its face, and load over its face.
 
 shafts with sections, bearings, gears, couplings -> Gearbox with meshes and housing
 -> bearing_reactions, elastic_line       displacements and forces

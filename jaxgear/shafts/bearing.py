@@ -28,20 +28,21 @@ class AbstractBearing(Checked):
     @property
     @abstractmethod
     def play(self) -> Scalar | None:
-        """Radial clearance [um]; None for a bearing without any."""
+        """Radial clearance [um]; None for a bearing without clearance."""
 
 
 class Bearing(AbstractBearing):
     """Bearing with the same stiffness in all radial directions.
 
     Attributes:
-        name: of bearing and seat, which is how a housing names it.
+        name: name of the bearing, and of its seat in the housing.
         position: distance from the left end of the shaft [mm].
-        radial: [N/um].
-        axial: [N/um]; 0 for a floating bearing, which takes no axial force. Shafts of helical gears need one that does.
-        tilting: against rotation about x and y [N m/rad]; 0 for a bearing that aligns itself.
-        clearance: by which the shaft can move to every side before the bearing resists, half the diametral clearance
-            [um]; None for none. See `operating_point` for what is made of it.
+        radial: radial stiffness [N/um].
+        axial: axial stiffness [N/um]; 0 for a floating bearing. A shaft of helical gears needs a bearing with axial
+            stiffness.
+        tilting: stiffness against rotation about x and y [N m/rad]; 0 for a self-aligning bearing.
+        clearance: radial clearance, half the diametral clearance [um]; None for none. Its effect is described in
+            `operating_point`.
     """
 
     name: str = eqx.field(static=True)
@@ -53,23 +54,23 @@ class Bearing(AbstractBearing):
 
     @property
     def matrix(self) -> Matrix:
-        """Diagonal stiffness."""
+        """Diagonal stiffness matrix in x, y, z, rx, ry [N/um, N mm/mrad]."""
         # 1 N m/rad is 1 N mm/mrad
         return jnp.diag(jnp.stack([self.radial, self.radial, self.axial, self.tilting, self.tilting]))
 
     @property
     def play(self) -> Scalar | None:
-        """`clearance`."""
+        """Radial clearance [um]; None for none."""
         return self.clearance
 
 
 class MatrixBearing(AbstractBearing):
-    """Bearing with a full stiffness matrix, for instance the tangent at its load of a bearing program.
+    """Bearing with a full stiffness matrix, for instance the tangent stiffness at its load from a bearing program.
 
     Attributes:
-        name: of bearing and seat.
+        name: name of the bearing, and of its seat in the housing.
         position: distance from the left end of the shaft [mm].
-        stiffness: in x, y, z, rx, ry: N/um, N/mrad = N mm/um, N mm/mrad = N m/rad.
+        stiffness: stiffness matrix in x, y, z, rx, ry [N/um, N/mrad = N mm/um, N mm/mrad = N m/rad], shape (5, 5).
 
     Raises:
         ValueError: for a matrix that is not 5 x 5, symmetric and positive semidefinite.
@@ -94,10 +95,10 @@ class MatrixBearing(AbstractBearing):
 
     @property
     def matrix(self) -> Matrix:
-        """The symmetric part, of which `stiffness` is made within rounding."""
+        """Symmetric part of `stiffness`, which is symmetric within rounding, shape (5, 5)."""
         return symmetric(self.stiffness)
 
     @property
     def play(self) -> None:
-        """None: the matrix is a tangent that knows of it."""
+        """None: a tangent stiffness includes the clearance."""
         return None

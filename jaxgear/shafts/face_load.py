@@ -31,16 +31,18 @@ _LEVEL = 1 - 1e-5  # factor of an even load, less rounding
 
 
 class FaceLoad(WithStatus, Checked):
-    """Load over the face by the one-dimensional analysis; NaN where it has not been found.
+    """Load over the face by the one-dimensional contact analysis; NaN where the analysis has not converged.
 
     Attributes:
-        face_coordinate: of the stations, evenly over the common face, from its middle.
-        line_load: at the stations.
-        gap: of the flanks under no load of this mesh: misalignment, modifications, other loads.
-        deformation: by which shafts, bearings and housing open the gap under the line load.
-        approach: of the flanks along the line of action.
-        in_contact: stations that carry load.
-        status: `converged` where all contact conditions hold, such a support is possible, and its gears can run.
+        face_coordinate: face coordinates of the stations, evenly spaced over the common face, from its middle [mm],
+            shape (stations,).
+        line_load: line load at the stations [N/mm], shape (stations,).
+        gap: gap of the flanks without the load of this mesh: misalignment, modifications, other loads [um], shape
+            (stations,).
+        deformation: gap opened by shafts, bearings and housing under the line load [um], shape (stations,).
+        approach: approach of the flanks along the line of action [um], shape ().
+        in_contact: True at stations that carry load, shape (stations,).
+        status: `converged` if all contact conditions hold, the support is valid, and its gears can run.
     """
 
     face_coordinate: Slices = result("mm")
@@ -53,17 +55,17 @@ class FaceLoad(WithStatus, Checked):
 
     @property
     def face_load_factor(self) -> Scalar:
-        """K_Hbeta, largest over mean line load."""
+        """K_Hbeta, largest over mean line load, shape ()."""
         return face_load_factor(self.line_load)
 
 
 def face_load_factor(line_load: Float[Array, "... slices"], slice_width: Slices | None = None) -> Float[Array, "..."]:
-    """K_Hbeta: largest over mean line load over the face, 1 without load, NaN of loads that have not been found.
+    """K_Hbeta: largest over mean line load over the face; 1 without load, NaN for a line load of NaN.
 
     Args:
-        line_load: over the face [N/mm], last axis; of a contact analysis that of one pair at one position, which
-            `metrics.face_load_factor` chooses.
-        slice_width: width of every slice [mm]; None where all are equal.
+        line_load: line load over the face [N/mm], shape (..., slices). From a contact analysis take one pair at one
+            position, as `metrics.face_load_factor` does.
+        slice_width: width of every slice [mm], shape (slices,); None for equal widths.
     """
     load = real(line_load)
     check("slice_width", slice_width, "mm", low=0.0, open_low=True)
@@ -75,7 +77,7 @@ def face_load_factor(line_load: Float[Array, "... slices"], slice_width: Slices 
 def _largest_over_mean(load: Array, width: Array) -> Array:
     width = jnp.broadcast_to(width, load.shape)
     mean = jnp.sum(load * width, axis=-1) / jnp.sum(width, axis=-1)
-    idle = mean <= 0  # loads that have not been found are not idle: they stay NaN
+    idle = mean <= 0  # a mean of NaN is not idle and stays NaN
     return jnp.where(idle, 1.0, maximum(load, axis=-1) / jnp.where(idle, 1.0, mean))
 
 
@@ -84,8 +86,8 @@ def root_face_load_factor(factor: Given, face_width: Given, tooth_height: Given)
 
     Args:
         factor: K_Hbeta.
-        face_width: b [mm], the smaller of the two gears.
-        tooth_height: h from root to tip [mm], of the gear with the larger h/b; h/b counts as 1/3 at most.
+        face_width: face width b [mm], the smaller one of the two gears.
+        tooth_height: tooth height h from root to tip [mm], of the gear with the larger h/b; h/b is limited to 1/3.
     """
     check("factor", factor, "", low=_LEVEL)
     check("face_width", face_width, "mm", low=0.0, open_low=True)
@@ -94,13 +96,13 @@ def root_face_load_factor(factor: Given, face_width: Given, tooth_height: Given)
 
 
 def root_exponent(face_width: Scalar, tooth_height: Scalar) -> Scalar:
-    """N_F of `root_face_load_factor`."""
+    """Exponent N_F = 1 / (1 + h/b + (h/b)^2) of `root_face_load_factor`, from b and h [mm]."""
     ratio = jnp.minimum(tooth_height / face_width, _WIDEST_TOOTH)
     return 1 / (1 + ratio + ratio**2)
 
 
 def tooth_height(pair: GearPair) -> Scalar:
-    """h for `root_face_load_factor` [mm]: over the common face width it gives the larger h/b of both gears."""
+    """Tooth height h for `root_face_load_factor` [mm]; h over the common face width is the larger h/b of both gears."""
 
     def of(gear: Gear) -> Scalar:
         return pair.face_width / gear.face_width * (gear.tip_radius - gear.root_circle_radius)
@@ -109,11 +111,11 @@ def tooth_height(pair: GearPair) -> Scalar:
 
 
 def mesh_stiffness(pair: GearPair, line_load: Given) -> Scalar:
-    """c_gamma_beta = 0.85 c_gamma_alpha [N/(mm um)] of ISO 6336-1 Method B.
+    """Mesh stiffness for K_Hbeta, c_gamma_beta = 0.85 c_gamma_alpha [N/(mm um)] (ISO 6336-1 Method B).
 
     Args:
         pair: gear pair.
-        line_load: F_t K_A / b [N/mm].
+        line_load: specific load F_t K_A / b [N/mm].
     """
     return _FACE_SHARE * iso_stiffness(pair, line_load).mesh
 
@@ -127,25 +129,28 @@ def annex_e(
     stiffness: Given | None = None,
     stations: int = _STATIONS,
 ) -> FaceLoad:
-    """Load over the face with a constant mesh stiffness, the shafts and the gap, as one complementarity problem.
+    """Load over the face with a constant mesh stiffness, shaft deflection and gap (ISO 6336-1, Annex E).
 
-    w / c_gamma + H w db + gap = approach where w > 0, and no contact closes a gap elsewhere; the sum of w db is the
-    force along the line of action. Where the standard repeats bending and load until they agree, this solves for both.
+    The line load w solves w / c_gamma + H w db + gap = approach where w > 0, without penetration elsewhere; the sum of
+    w db is the force along the line of action. The standard iterates between deflection and load; this function solves
+    for both at once, as one complementarity problem.
 
     Args:
-        support: shafts at the mesh, `support` of a gearbox or `RigidSupport`.
-        torque: on the pinion [N m], application factor included; None for that of the gearbox.
-        pinion, wheel: modifications and deviations, taken along the pitch line; None for none.
-        stiffness: c_gamma [N/(mm um)]; None for `mesh_stiffness`.
-        stations: over the face. The largest load is that of a station's middle, (K_Hbeta - 1) / stations below that
-            at the end of a straight line load.
+        support: support of the mesh, `support` of a gearbox or `RigidSupport`.
+        torque: torque on the pinion [N m], application factor included; None for the torque of the gearbox.
+        pinion, wheel: modifications and deviations, evaluated along the pitch line; None for none.
+        stiffness: mesh stiffness c_gamma [N/(mm um)]; None for `mesh_stiffness`.
+        stations: number of stations over the face. The largest load is the value at the middle of a station; for a
+            straight line load it is (K_Hbeta - 1) / stations below the value at the end of the face.
 
     Returns:
-        the load, differentiable; NaN and not `converged` where it has not been found, as of shafts afloat in their
-        bearings, and where traced gears, shafts, bearings or housing are not possible: its status tells which.
+        the load over the face, differentiable. It is NaN and not `converged` where no solution exists, for instance if
+        a shaft floats in its bearing clearances, and where traced gears, shafts, bearings or housing are not valid; the
+        status gives the reason.
 
     Raises:
-        ValueError: for a torque beside that of a gearbox, or without any; for numbers out of their range.
+        ValueError: if a torque is given in addition to that of a gearbox, or no torque at all; for numbers out of their
+            range.
     """
     of_gearbox = isinstance(support, ShaftSupport)
     if (torque is None) != of_gearbox:
@@ -161,7 +166,7 @@ def annex_e(
 
 @program
 def _removed(pair: GearPair, pinion: AbstractModification, wheel: AbstractModification, stations: int) -> Slices:
-    """Material removed by both flanks [um]; a program of its own, so that one for the load serves all kinds."""
+    """Modification amount of both flanks at the stations [um]; a separate program, so that `_annex_e` compiles once."""
     y = even_coordinates(pair.face_width, stations)
     amount = sum(item(flank) for item, flank in zip((pinion, wheel), _pitch_lines(pair, y)))
     return jnp.broadcast_to(amount, y.shape)
@@ -180,7 +185,7 @@ def _annex_e(
     width = pair.face_width
     y, step = even_coordinates(width, stations), width / stations
     if stiffness is None:
-        # that of the standard vanishes with the load; without any, every stiffness gives the same
+        # the stiffness of the standard vanishes with the load; without load any stiffness gives the same result
         some = jnp.where(moment > 0, moment, 1.0)
         stiffness = mesh_stiffness(pair, 1e3 * some / (pair.pinion.pitch_radius * width))
     influence = support.influence(y)
@@ -192,7 +197,7 @@ def _annex_e(
     def where_found(value: Array) -> Array:
         return jnp.where(status == Status.CONVERGED, value, jnp.nan)
 
-    # a load that has not been found must not pass for an even one, nor for none
+    # an unconverged load must not look like an even load or like no load
     return FaceLoad(
         face_coordinate=y,
         line_load=where_found(found.force / step),

@@ -1,4 +1,4 @@
-"""Shafts that mesh with each other in one housing: where they lie, and which way the torque takes."""
+"""Gearbox: shafts, meshes and housing; positions of the axes, and path of the torque."""
 
 from collections.abc import Iterator, Sequence
 from itertools import combinations
@@ -20,12 +20,12 @@ from .stepped_beam import semidefinite
 
 
 class Path(NamedTuple):
-    """Shafts and meshes as a tree.
+    """Path of the torque through the tree of shafts and meshes.
 
     Attributes:
-        turning: 1 for shafts that turn as the first one does, -1 for the others.
-        inwards: meshes from the farthest to the nearest of the shaft where the rest of the torque leaves, each with the
-            shaft on its far side.
+        turning: 1 for shafts that turn in the direction of the first shaft, -1 for the others.
+        inwards: meshes, ordered from the farthest to the nearest to the output shaft, each with the shaft on its far
+            side. The output shaft is the one whose coupling has no given torque.
     """
 
     turning: tuple[int, ...]
@@ -33,11 +33,11 @@ class Path(NamedTuple):
 
 
 def _torque_path(shafts: Sequence[str], meshes: Sequence[tuple[int, int]], outlet: int) -> Path:
-    """The path through shafts that meshes (shaft of the pinion, shaft of the wheel) join.
+    """Path of the torque through shafts, from meshes (shaft of the pinion, shaft of the wheel) and the output shaft.
 
     Raises:
-        ValueError: for shafts that no mesh joins to the others, or that meshes join in a circle: how such meshes share
-            the torque depends on their play.
+        ValueError: for shafts that no mesh joins to the others, or for meshes that form a loop: how they share the
+            torque depends on their backlash.
     """
     turning = {outlet: 1}
     outwards: list[tuple[int, int]] = []
@@ -73,10 +73,10 @@ class GearMesh(Checked):
 
     Attributes:
         pinion, wheel: names of the driving and the driven gear.
-        angle: of the direction from the axis of the pinion to that of the wheel, from x towards y [deg].
-        center_distance: [mm]; None for the backlash-free one.
-        misalignment: of the axes beyond what loads make of it.
-        axial_offset: of the middle of the wheel's face from that of the pinion's [mm].
+        angle: angle of the direction from the pinion axis to the wheel axis, from x towards y [deg].
+        center_distance: centre distance [mm]; None for the backlash-free centre distance.
+        misalignment: misalignment of the axes without load; deflections under load add to it.
+        axial_offset: offset of the middle of the wheel face from the middle of the pinion face [mm].
     """
 
     pinion: str = eqx.field(static=True)
@@ -88,21 +88,21 @@ class GearMesh(Checked):
 
 
 class Gearbox(Checked):
-    """Parallel shafts, the meshes between them, and the housing that holds them.
+    """Parallel shafts, the meshes between them, and the housing that supports them.
 
-    Axes: z along the shafts, x and y across, right-handed. One coupling has no torque of its own: what the others bring
-    and take leaves there.
+    Axes: z along the shafts, x and y across, right-handed. One coupling has no given torque: its torque follows from
+    the equilibrium with the other couplings.
 
     Attributes:
         shafts: each with its bearings, gears, couplings and loads.
-        meshes: pinions drive wheels; shafts and meshes form a tree. None for a shaft on its own.
-        housing: at the seats of all bearings; None for rigid seats.
-        direction: in which the first shaft turns, seen against z, that is with x to the right and y upwards.
+        meshes: meshes, in which pinions drive wheels; shafts and meshes form a tree. Empty for a single shaft.
+        housing: housing with the seats of all bearings; None for rigid seats.
+        direction: sense of rotation of the first shaft, seen against z: x points to the right and y upwards.
 
     Raises:
         ValueError: for names that are unknown or given twice, gears that cannot mesh, shafts that no mesh joins or that
-            form a circle, torque without a way out, a wheel that drives its pinion, or a housing without a seat for
-            every bearing.
+            form a loop, no coupling for the output torque, a wheel that drives its pinion, or a housing without a seat
+            for every bearing.
     """
 
     shafts: tuple[Shaft, ...] = eqx.field(converter=tuple)
@@ -142,10 +142,11 @@ class Gearbox(Checked):
 
     @property
     def status(self) -> Statuses:
-        """Whether such a gearbox is possible, as far as numbers tell: every one in its range, shafts held, nothing
-        beyond their ends, the housing definite, pinions that drive; and whether all its gears can run.
+        """Status of the numeric checks of the gearbox and of its gears.
 
-        A concrete gearbox that is not possible is refused; of a traced one the load over the face has this status.
+        The checks: all numbers in their ranges, shafts supported, all parts within the ends of their shafts, a definite
+        housing matrix, pinions that drive, and gears that can run. A concrete gearbox that fails raises an error when
+        it is made; the load over the face of a traced gearbox carries this status.
         """
         return _status(self)
 
@@ -156,7 +157,7 @@ class Gearbox(Checked):
 
     @property
     def path(self) -> Path:
-        """The way of the torque."""
+        """Path of the torque through shafts and meshes."""
         return _torque_path(
             [shaft.name for shaft in self.shafts],
             [(self.place(mesh.pinion)[0], self.place(mesh.wheel)[0]) for mesh in self.meshes],
@@ -164,7 +165,7 @@ class Gearbox(Checked):
         )
 
     def place(self, gear: str) -> tuple[int, MountedGear]:
-        """Which shaft a gear sits on, and the gear."""
+        """Index of the shaft of a gear, and the mounted gear; raises `ValueError` for an unknown name."""
         for index, shaft in enumerate(self.shafts):
             for mounted in shaft.gears:
                 if mounted.name == gear:
@@ -172,10 +173,10 @@ class Gearbox(Checked):
         raise ValueError(f'Gearbox: gear "{gear}" is on no shaft')
 
     def pair(self, mesh: int) -> GearPair:
-        """The gears of a mesh, for `prepare`; face coordinates run along z.
+        """Gear pair of a mesh, for `prepare`; face coordinates point along z.
 
-        Helical gears whose pinion turns clockwise are given with the other hand: turning counterclockwise, as pairs do,
-        these have the same contact, their mirror image about a plane through both axes.
+        A `GearPair` turns counterclockwise. If the pinion turns clockwise, helical gears are returned with the opposite
+        hand: that pair is the mirror image about the plane through both axes and has the same contact.
         """
         given = self.meshes[mesh]
         (shaft, pinion), (_, wheel) = self.place(given.pinion), self.place(given.wheel)
@@ -185,7 +186,7 @@ class Gearbox(Checked):
         return GearPair(*gears, given.center_distance, given.axial_offset)
 
     def turning(self, shaft: int) -> int:
-        """1 for a shaft that turns counterclockwise, seen against z, -1 for the others."""
+        """Sense of rotation of a shaft: 1 for counterclockwise, seen against z, -1 for clockwise."""
         return self.path.turning[shaft] * (1 if self.direction == "counterclockwise" else -1)
 
     def pinion_torques(self) -> Float[Array, " meshes"]:
@@ -248,10 +249,10 @@ def _check_known(kind: str, name: str, names: list[str]) -> None:
 
 
 def axes_of(gearbox: Gearbox) -> np.ndarray:
-    """Left ends of all shafts in x, y, z, that of the first one at the origin, shape (shafts, 3) [mm].
+    """Coordinates x, y, z of the left ends of all shafts, the first one at the origin [mm], shape (shafts, 3).
 
     Args:
-        gearbox: of concrete numbers; its meshes say how far and in which direction axes are apart.
+        gearbox: gearbox of concrete numbers; centre distances and angles of its meshes give the positions.
     """
     at = {0: np.zeros(3)}
     while len(at) < len(gearbox.shafts):
@@ -268,10 +269,10 @@ def axes_of(gearbox: Gearbox) -> np.ndarray:
 
 
 def tip_clearances(gearbox: Gearbox) -> dict[str, float]:
-    """Room between the tips of gears and what passes them on other shafts: gears, but their mates, and the shafts [mm].
+    """Radial clearances between the tips of gears and the other shafts and their gears, mates excepted [mm].
 
     Args:
-        gearbox: of concrete numbers.
+        gearbox: gearbox of concrete numbers.
     """
     axes, meshing = axes_of(gearbox), {frozenset((mesh.pinion, mesh.wheel)) for mesh in gearbox.meshes}
     bodies = [each for index, shaft in enumerate(gearbox.shafts) for each in _bodies(index, shaft, axes[index][2])]

@@ -1,4 +1,4 @@
-"""The housing between the bearing seats: a matrix condensed from a finite-element model, and its files.
+"""Housing between the bearing seats: a matrix condensed from a finite-element model, and its files.
 
 CSV: the first cell of the first row names kind and unit, "stiffness N/um" for instance, the others the columns; every
 further row begins with its name. Names are SEAT.DIRECTION, with the name of a bearing and x, y, z, rx or ry; rows and
@@ -10,11 +10,11 @@ columns in the same order. Lines that begin with # are comments.
 
 npz: an array `stiffness` or `compliance`, and `nodes` and `unit` as strings.
 
-Units: N/um is the system um, mrad, N, N mm of this package; N/mm is mm, rad, N, N mm; N/m is m, rad, N, N m. Of a
-compliance the unit is the inverse: um/N, mm/N, m/N. Directions are the axes of the gearbox; rotations are rotations of
-the seat, forces act on the housing. The foundation is held.
+Units: N/um is the system um, mrad, N, N mm of this package; N/mm is mm, rad, N, N mm; N/m is m, rad, N, N m. The unit
+of a compliance is the inverse: um/N, mm/N, m/N. Directions are the axes of the gearbox; rotations are rotations of the
+seat, forces act on the housing. The foundation is fixed.
 
-With K the stiffness matrix of the model, its foundation held, and W the nodal forces of a unit force or moment on each
+With K the stiffness matrix of the model, its foundation fixed, and W the nodal forces of a unit force or moment on each
 seat direction, the compliance between the seats is
 
     C = W^T K^-1 W
@@ -48,7 +48,7 @@ from .stepped_beam import DIRECTIONS, check_symmetric, semidefinite, symmetric
 Matrix = Float[Array, "rows columns"]
 Kind = Literal["stiffness", "compliance"]
 
-# Smallest eigenvalue over the largest one, of a matrix scaled to a diagonal of 1, that is more than rounding.
+# Smallest ratio of the extreme eigenvalues of a matrix scaled to a diagonal of 1 that exceeds rounding.
 _DEFINITE = 1e-10
 
 
@@ -56,15 +56,15 @@ class Housing(Checked):
     """Stiffness or compliance of a housing at the seats of the bearings, foundation included.
 
     Attributes:
-        nodes: what each row and column is, "SEAT.DIRECTION" with the name of a bearing and x, y, z, rx or ry; a seat
+        nodes: names of the rows and columns, "SEAT.DIRECTION" with the name of a bearing and x, y, z, rx or ry; a seat
             is rigid in directions that are missing.
-        matrix: N/um, N/mrad, N mm/mrad, or their inverses for a compliance (um/N ...).
-        kind: "stiffness" or "compliance". A stiffness must be positive definite: a housing that floats in space has to
-            be fixed to its foundation. A compliance may have no deformation at all in some direction.
+        matrix: stiffness [N/um, N/mrad, N mm/mrad] or compliance [um/N, mrad/N, mrad/(N mm)], shape (nodes, nodes).
+        kind: "stiffness" or "compliance". A stiffness must be positive definite: the housing must be fixed to its
+            foundation. A compliance must be positive semidefinite: it may be rigid in some directions.
 
     Raises:
-        ValueError: for rows that are unknown or named twice, a matrix that does not fit them, is not symmetric or not
-            definite.
+        ValueError: for rows that are unknown or named twice, and for a matrix of another size, or that is not symmetric
+            or not definite.
     """
 
     nodes: tuple[str, ...] = eqx.field(static=True, converter=tuple)
@@ -88,7 +88,7 @@ class Housing(Checked):
 
     @property
     def valid(self) -> Bool[Array, ""]:
-        """Whether the symmetric part of the matrix is definite, a compliance semidefinite; traced ones may not be."""
+        """True if the symmetric part of a stiffness is positive definite, of a compliance semidefinite; for tracing."""
         even = symmetric(self.matrix)
         diagonal, unit = jnp.diagonal(even), jnp.eye(len(even), dtype=even.dtype)
         scale = 1 / jnp.sqrt(jnp.where(diagonal > 0, diagonal, 1.0))
@@ -99,12 +99,12 @@ class Housing(Checked):
 
     @property
     def compliance(self) -> Matrix:
-        """Displacement per force in the order of `nodes`."""
+        """Compliance matrix in the order of `nodes` [um/N, mrad/N, mrad/(N mm)], shape (nodes, nodes)."""
         even = symmetric(self.matrix)
         return even if self.kind == "compliance" else solve_dense(even, jnp.eye(len(even), dtype=even.dtype))
 
     def at(self, bearings: tuple[str, ...]) -> Float[Array, "directions directions"]:
-        """Compliance in x, y, z, rx, ry of one bearing seat after the other [um/N, mrad/N, mrad/(N mm)]."""
+        """Compliance matrix in x, y, z, rx, ry of the seats of bearings, in their order [um/N, mrad/N, mrad/(N mm)]."""
         places = {name: index for index, name in enumerate(bearings)}
         rows = np.array(
             [len(DIRECTIONS) * places[seat] + DIRECTIONS.index(way) for seat, way in map(_split, self.nodes)]
@@ -151,7 +151,7 @@ def _check_definite(matrix: np.ndarray, kind: Kind, nodes: tuple[str, ...]) -> N
         )
 
 
-# what one unit of force, moment, displacement and rotation is in N, N mm, um and mrad
+# one unit of force, moment, displacement and rotation of each system in N, N mm, um and mrad
 _SYSTEMS = {"um": (1.0, 1.0, 1.0, 1.0), "mm": (1.0, 1.0, 1e3, 1e3), "m": (1.0, 1e3, 1e6, 1e3)}
 _UNITS = {
     **{("stiffness", f"N/{length}"): length for length in _SYSTEMS},
@@ -160,12 +160,12 @@ _UNITS = {
 
 
 def read_housing(path: str | Path) -> Housing:
-    """The housing of a CSV or npz file.
+    """Read a housing from a CSV or npz file.
 
     Raises:
-        ValueError: in one line that names the file and what is wrong with it: no such file, another ending, an unknown
-            kind, unit or node, rows and columns that differ, something else than a number, a matrix that is not square,
-            symmetric or positive definite.
+        ValueError: in one line with the file name and the reason: missing file, another file extension, an unknown
+            kind, unit or node, rows and columns that differ, an entry that is not a number, a matrix that is not
+            square, symmetric or positive definite.
     """
     path = Path(path)
     readers = {".csv": _from_csv, ".npz": _from_npz}
@@ -180,10 +180,10 @@ def read_housing(path: str | Path) -> Housing:
 
 
 def write_housing(path: str | Path, housing: Housing) -> None:
-    """Writes a housing as CSV or npz, in the units of this package.
+    """Write a housing as CSV or npz, in the units of this package.
 
     Raises:
-        ValueError: for another ending.
+        ValueError: for another file extension.
     """
     path = Path(path)
     unit = "N/um" if housing.kind == "stiffness" else "um/N"
@@ -273,18 +273,21 @@ def spread_forces(
 ) -> np.ndarray:
     """Nodal forces of unit forces (and moments) on a seat in the directions x, y, z (, rx, ry).
 
-    They are the smallest nodal forces with that resultant and no other: of a force equal on all nodes, where these lie
-    evenly around the centre.
+    They are the nodal forces of least norm with the given resultant; a force is shared equally by nodes that lie evenly
+    around the centre.
 
     Args:
-        nodes: coordinates of the nodes of the bore, shape (nodes, 3) [mm].
-        center: of the seat [mm].
+        nodes: coordinates of the nodes of the bore [mm], shape (nodes, 3).
+        center: centre of the seat [mm], shape (3,).
         degrees_of_freedom: rows of every node's x, y and z in the stiffness matrix, shape (nodes, 3).
         size: number of rows of the stiffness matrix.
-        tilting: whether the seat takes moments.
+        tilting: True if the seat carries moments.
+
+    Returns:
+        nodal forces, shape (size, 3 or 5).
 
     Raises:
-        ValueError: for nodes that cannot carry the moments because they lie on one line, or rows that are not there.
+        ValueError: for nodes on one line, which cannot carry the moments, or for rows outside the matrix.
     """
     arms = np.asarray(nodes, float) - np.asarray(center, float)
     count = len(arms)
@@ -321,15 +324,16 @@ def spread_forces(
 def condense(
     stiffness: "scipy.sparse.sparray | scipy.sparse.spmatrix | np.ndarray", seats: Mapping[str, np.ndarray]
 ) -> Housing:
-    """The housing of a finite-element model in mm, N and rad, as its compliance between the seats.
+    """Condense a finite-element model of a housing in mm, N and rad to the compliance between its bearing seats.
 
     Args:
-        stiffness: sparse symmetric matrix [N/mm], with the rows of held degrees of freedom taken out.
-        seats: for every bearing name the nodal forces of unit loads in x, y, z (, rx, ry), for instance
+        stiffness: sparse symmetric matrix [N/mm], without the rows and columns of fixed degrees of freedom.
+        seats: for every bearing name the nodal forces of unit loads in x, y, z (, rx, ry), for instance from
             `spread_forces`, shape (rows, 3 or 5).
 
     Raises:
-        ValueError: for seats that do not fit the matrix, a matrix that is not symmetric, or a model that is not held.
+        ValueError: for seats whose size differs from the matrix, a matrix that is not symmetric, or a model that is not
+            fixed to its foundation.
     """
     matrix = scipy.sparse.csc_matrix(stiffness)
     if matrix.shape[0] != matrix.shape[1] or abs(matrix - matrix.T).max() > _ASYMMETRY * abs(matrix).max():
@@ -345,7 +349,7 @@ def condense(
         raise ValueError("seats must not be empty")
     loads = np.concatenate(list(seats.values()), axis=1)
     try:
-        with threadpool_limits(limits=1):  # many small blocks: threads only get in each other's way
+        with threadpool_limits(limits=1):  # many small blocks: more threads are slower
             factors = scipy.sparse.linalg.splu(
                 matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
             )

@@ -23,7 +23,7 @@ Hardening = Literal["surface_hardened", "through_hardened", "cast_iron"]
 # K' of the arrangements a to e of pinion and bearings: stiffened by the pinion (d1 / d_sh >= 1.15), and not
 _ARRANGEMENTS = {"a": (0.48, 0.80), "b": (-0.48, -0.80), "c": (1.33, 1.33), "d": (-0.36, -0.60), "e": (-0.60, -1.0)}
 _STIFFENED = 1.15  # d1 / d_sh
-# B1 and B2, by which modifications take off f_sh and f_ma
+# factors B1 and B2, by which flank line modifications reduce f_sh and f_ma
 _EFFECTS = {
     "none": (1.0, 1.0),
     "crowned_for_tolerance": (1.0, 0.5),
@@ -56,15 +56,15 @@ def iso_shaft_deflection(
     f_sh = (F_m / b) 0.023 (|B* + K' (l s / d1^2) (d1 / d_sh)^4 - 0.3| + 0.3) (b / d1)^2
 
     Args:
-        line_load: F_m / b = F_t K_A K_v / b [N/mm].
-        face_width: b [mm].
-        pitch_diameter: d1 of the pinion [mm].
-        shaft_diameter: d_sh [mm].
-        arrangement: of pinion, bearings and coupling, a to e of the figure in the standard (K' 0.48/0.80, -0.48/-0.80,
-            1.33, -0.36/-0.60, -0.60/-1.0).
-        span: l, distance of the bearings [mm].
-        offset: s, distance of the pinion from the middle of the bearings, of an overhung one too [mm].
-        power_share: k, of the power through this mesh [%]; B* = 1 + 2 (100 - k) / k of a spur gear.
+        line_load: line load F_m / b = F_t K_A K_v / b [N/mm].
+        face_width: face width b [mm].
+        pitch_diameter: reference diameter d1 of the pinion [mm].
+        shaft_diameter: shaft diameter d_sh [mm].
+        arrangement: arrangement of pinion, bearings and coupling, a to e of the figure in the standard (K' 0.48/0.80,
+            -0.48/-0.80, 1.33, -0.36/-0.60, -0.60/-1.0).
+        span: bearing span l [mm].
+        offset: distance s of the pinion from the middle of the bearing span, also for an overhung pinion [mm].
+        power_share: share k of the power through this mesh [%]; B* = 1 + 2 (100 - k) / k for spur gears.
     """
     values = {"line_load": (line_load, "N/mm"), "offset": (offset, "mm")}
     for name, (value, unit) in values.items():
@@ -96,17 +96,17 @@ def method_c(
 ) -> Scalar:
     """K_Hbeta by Method C.
 
-    F_betax = 1.33 B1 f_sh + B2 f_ma, at least max(0.005 F_m / b, 0.5 f_Hbeta); running in takes y_beta off it.
+    F_betax = 1.33 B1 f_sh + B2 f_ma, at least max(0.005 F_m / b, 0.5 f_Hbeta); running-in reduces it by y_beta.
 
     Args:
-        line_load: F_m / b = F_t K_A K_v / b [N/mm].
-        stiffness: c_gamma_beta [N/(mm um)].
-        shaft_deflection: f_sh [um], for instance `iso_shaft_deflection`.
+        line_load: line load F_m / b = F_t K_A K_v / b [N/mm].
+        stiffness: mesh stiffness c_gamma_beta [N/(mm um)].
+        shaft_deflection: f_sh [um], for instance from `iso_shaft_deflection`.
         misalignment: f_ma [um].
-        flank_line: what has been done about the flank line.
-        helix_tolerance: f_Hbeta [um].
-        hardening: of the flanks, for the running in.
-        endurance_limit: sigma_Hlim [MPa], which through-hardened flanks need.
+        flank_line: kind of flank line modification, which sets B1 and B2.
+        helix_tolerance: helix slope tolerance f_Hbeta [um].
+        hardening: hardening of the flanks, which sets the running-in allowance.
+        endurance_limit: endurance limit sigma_Hlim [MPa], needed for through-hardened flanks.
 
     Raises:
         ValueError: for an unknown choice, through-hardened flanks without their endurance limit, or a number out of its
@@ -131,7 +131,7 @@ def method_c(
 
 
 def _running_in(initial: Scalar, hardening: Hardening, endurance_limit: Given | None) -> Scalar:
-    """y_beta [um]."""
+    """Running-in allowance y_beta [um]."""
     _check_choice("hardening", hardening, get_args(Hardening))
     if endurance_limit is not None and hardening != "through_hardened":
         raise ValueError(f'endurance_limit has no effect on hardening = "{hardening}"')

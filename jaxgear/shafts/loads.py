@@ -1,14 +1,15 @@
 """Static equilibrium of all shafts of a gearbox on their bearings, under meshes and other loads.
 
-Unknown are the forces of all bearings on their shafts f and how every shaft moves as a whole q. With F the flexibility
-of the shafts held at their left ends, R what their points move with q, K the bearings and C the housing:
+Unknowns are the forces f of all bearings on their shafts and the rigid-body displacements q of all shafts. With F the
+flexibility of the shafts clamped at their left ends, R the displacements of their points per q, K the stiffness of the
+bearings and C the compliance of the housing:
 
     u_b = F_bb f + F_bp p + R_b q        bearings under their forces and the loads p
     f = f_0 - K (u_b + C f)              the seats move by -C f
     R_b^T f + R_p^T p = 0                every shaft is in equilibrium
     u_p = F_pb f + F_pp p + R_p q
 
-A load p is a vector in x, y, z, rx, ry at each of several points; a displacement u_p is what it would do work on.
+A load p is a vector in x, y, z, rx, ry at each of several points; u_p is the displacement conjugate to p in work.
 """
 
 from typing import NamedTuple
@@ -24,11 +25,11 @@ _WAYS = len(DIRECTIONS)
 
 
 class Patterns(NamedTuple):
-    """Loads of one shaft, or what its displacements are weighted with.
+    """Load patterns on one shaft; they also weight its displacements.
 
     Attributes:
-        at: positions [mm].
-        vectors: of every pattern, x, y, z, rx, ry at each position.
+        at: positions on the shaft [mm], shape (points,).
+        vectors: components x, y, z, rx, ry of every pattern at each position [N, N mm].
     """
 
     at: Float[Array, " points"]
@@ -36,16 +37,16 @@ class Patterns(NamedTuple):
 
 
 class System(NamedTuple):
-    """The matrices of the equations above, bearings first.
+    """Matrices of the equations above, rows of the bearings first.
 
     Attributes:
-        flexibility: F.
-        moving: R, all shafts side by side.
-        bearings: K.
-        housing: C.
-        loose: 1 for movements that no bearing resists, which stay zero.
-        play: f_0, force of the bearings at no displacement by their tangent K, which misses the origin where they have
-            clearance [N, N mm]; zero of linear bearings.
+        flexibility: flexibility F of the clamped shafts [um/N, mrad/N, mrad/(N mm)].
+        moving: displacements R per rigid-body displacement of the shafts, all shafts side by side.
+        bearings: stiffness K of the bearings [N/um, N/mrad, N mm/mrad].
+        housing: compliance C of the housing [um/N, mrad/N, mrad/(N mm)].
+        loose: 1 for rigid-body displacements that no bearing resists, which stay zero; else 0.
+        play: force f_0 of the bearings at zero displacement, extrapolated by their tangent K, which does not pass
+            through the origin with clearance [N, N mm]; zero for linear bearings.
     """
 
     flexibility: Float[Array, "n n"]
@@ -57,13 +58,13 @@ class System(NamedTuple):
 
 
 class Equilibrium(NamedTuple):
-    """One column for each load.
+    """Forces and displacements in equilibrium, one column for each load.
 
     Attributes:
-        force: of the bearings on their shafts [N, N mm].
+        force: force of the bearings on their shafts [N, N mm].
         bearing: displacement of the shafts at the bearings [um, mrad].
         seat: displacement of the seats [um, mrad].
-        pattern: displacement of every pattern.
+        pattern: displacement conjugate to every load pattern [um, mrad].
     """
 
     force: Float[Array, "b loads"]
@@ -73,11 +74,11 @@ class Equilibrium(NamedTuple):
 
 
 def system(gearbox: Gearbox, patterns: list[Patterns]) -> System:
-    """The equations of a gearbox.
+    """Set up the equations of a gearbox.
 
     Args:
         gearbox: shafts, bearings, housing.
-        patterns: for every shaft, equally many.
+        patterns: load patterns of every shaft, the same number for each.
     """
     shafts = gearbox.shafts
     count = sum(len(shaft.bearings) for shaft in shafts)
@@ -110,14 +111,14 @@ def solve(of: System, loads: Float[Array, "patterns loads"], *, actual: bool = F
     """Forces and displacements under several loads, each a sum of the patterns.
 
     Args:
-        of: the equations.
-        loads: share of every pattern in every load.
-        actual: whether the play of the bearings counts, as in a state; not in what a further load changes.
+        of: equations of the gearbox.
+        loads: factor of every pattern in every load, shape (patterns, loads).
+        actual: True to include the bearing clearance, for a state under load; False for the change by a further load.
     """
     count = len(of.bearings)
     inner, across = of.flexibility[:count, :count], of.flexibility[:count, count:] @ loads
     here, there = of.moving[:count], of.moving[count:]
-    # a row of a stiff bearing and one of a soft one are brought to the same size
+    # rows of stiff and of soft bearings are scaled to the same size
     size = 1 + jnp.abs(of.bearings) @ jnp.max(jnp.abs(inner), axis=1)
     upper = (
         jnp.concatenate([jnp.eye(count) + of.bearings @ (inner + of.housing), of.bearings @ here], axis=1)
@@ -139,19 +140,19 @@ def solve(of: System, loads: Float[Array, "patterns loads"], *, actual: bool = F
 Slices = Float[Array, " slices"]
 Scalar = Float[Array, ""]
 
-# Points over which the force of a mesh is spread where it loads another one: exact for an elastic line of one
-# piece; on the same face, of an idler, its wind-up is off by 3 %.
+# Number of points that represent the mesh force on another mesh: exact for an elastic line without steps; on the
+# same face, for an idler gear, the wind-up has an error of 3 %.
 _POINTS = 4
 
 
 class Acting(NamedTuple):
-    """A mesh in the axes of the gearbox.
+    """Force of a mesh in the axes of the gearbox.
 
     Attributes:
-        shafts: of pinion and wheel.
-        positions: of the middle of the common face on both shafts [mm].
-        base_radii: [mm].
-        ways: of the force on pinion and wheel per force on the line of action, in x, y, z, rx, ry [N, N mm per N].
+        shafts: indices of the shafts of pinion and wheel.
+        positions: positions of the middle of the common face on both shafts [mm].
+        base_radii: base radii of pinion and wheel [mm].
+        ways: force on pinion and wheel in x, y, z, rx, ry per force along the line of action [N/N, N mm/N].
         half: half the common face width [mm].
     """
 
@@ -163,11 +164,12 @@ class Acting(NamedTuple):
 
 
 def acting(gearbox: Gearbox, mesh: int) -> Acting:
-    """Where and in which direction the force of a mesh acts.
+    """Point of application and direction of the force of a mesh.
 
-    The pinion pushes the wheel forwards by cos(alpha_wt) and away from itself by sin(alpha_wt). Helical gears push each
-    other along their axes too, by F_ax = F tan(beta_b): the wheel away from the end that enters the mesh first. That
-    force acts at the pitch point, wherever on the path of contact the teeth touch, and tilts both shafts by F_ax r_w.
+    Per unit force along the line of action, the tangential component on the wheel is cos(alpha_wt) and the radial
+    component away from the pinion is sin(alpha_wt). Helical gears add an axial force F_ax = F tan(beta_b), which pushes
+    the wheel away from the end of the face that enters the mesh first. The axial force is applied at the pitch point,
+    independent of the mesh position, and tilts both shafts by the moment F_ax r_w.
     """
     given, pair = gearbox.meshes[mesh], gearbox.pair(mesh)
     (first, pinion), (second, wheel) = gearbox.place(given.pinion), gearbox.place(given.wheel)
@@ -188,7 +190,7 @@ def acting(gearbox: Gearbox, mesh: int) -> Acting:
 
 
 def mesh_patterns(gearbox: Gearbox, mesh: int, y: Slices) -> list[Patterns]:
-    """Unit forces between the flanks at face coordinates, for every shaft."""
+    """Load patterns of unit forces between the flanks at face coordinates [mm], for every shaft."""
     where = acting(gearbox, mesh)
     found = []
     for index in range(len(gearbox.shafts)):
@@ -202,7 +204,8 @@ def mesh_patterns(gearbox: Gearbox, mesh: int, y: Slices) -> list[Patterns]:
 
 
 def load_pattern(gearbox: Gearbox, without: int | None = None) -> list[Patterns]:
-    """All loads as one pattern for every shaft: meshes, even over their faces, but for one; and loads from outside."""
+    """One pattern per shaft of all external loads and of the mesh forces, even over the faces, except mesh `without`.
+    """
     points, weights = gauss_legendre(_POINTS)
     at: list[list[Array]] = [[] for _ in gearbox.shafts]
     vectors: list[list[Array]] = [[] for _ in gearbox.shafts]
@@ -223,7 +226,7 @@ def load_pattern(gearbox: Gearbox, without: int | None = None) -> list[Patterns]
 
 
 def side_by_side(first: list[Patterns], second: list[Patterns]) -> list[Patterns]:
-    """Patterns of two lists for the same shafts."""
+    """Join the patterns of two lists shaft by shaft."""
     found = []
     for one, two in zip(first, second):
         left = jnp.concatenate([one.vectors, jnp.zeros((*one.vectors.shape[:2], two.vectors.shape[2]))], axis=2)
@@ -235,9 +238,9 @@ def side_by_side(first: list[Patterns], second: list[Patterns]) -> list[Patterns
 def torques_on(
     gearbox: Gearbox, shaft: int, without: int | None = None
 ) -> tuple[Float[Array, " points"], Float[Array, " points"]]:
-    """Positions and torques on a shaft, positive where they drive it [N mm], those of all but one mesh.
+    """Positions [mm] and torques [N mm] on a shaft, positive for driving torques; mesh `without` is left out.
 
-    Meshes act evenly over their faces; the coupling without a torque of its own takes what is left.
+    Mesh forces are even over their faces. The coupling without a given torque balances the others.
     """
     points, weights = gauss_legendre(_POINTS)
     at: list[Array] = []

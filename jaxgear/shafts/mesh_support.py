@@ -24,11 +24,11 @@ def _status(gears: GearPair, possible: Bool[Array, ""]) -> Statuses:
 
 
 class RigidSupport(AbstractSupport):
-    """Rigid axes, which need not be parallel.
+    """Support by rigid axes, with a misalignment.
 
     Attributes:
-        gears: the pair.
-        misalignment: of their axes.
+        gears: gear pair.
+        misalignment: misalignment of the axes.
     """
 
     gears: GearPair
@@ -41,15 +41,15 @@ class RigidSupport(AbstractSupport):
 
     @property
     def status(self) -> Statuses:
-        """Whether all numbers are in their ranges and the gears can run."""
+        """Status of the checks: numbers in their ranges, and gears that can run."""
         return _status(self.gears, within_limits(self))
 
     def influence(self, y: Slices) -> Float[Array, "slices slices"]:
-        """Zero."""
+        """Zero influence: the axes are rigid [um/N], shape (slices, slices)."""
         return jnp.zeros((len(y), len(y)))
 
     def gap(self, y: Slices) -> Slices:
-        """Gap due to the misalignment [um]."""
+        """Gap due to the misalignment at face coordinates [mm]; in um, shape (slices,)."""
         return self.misalignment.over_face(self.pair) * real(y) / self.pair.face_width
 
 
@@ -57,13 +57,14 @@ class TabulatedSupport(AbstractSupport):
     """Support given as a table by another program or a measurement; the same at every torque.
 
     Attributes:
-        gears: the pair.
-        matrix: influence, gap that opens in a slice under a unit force between the flanks of another, over slices of
-            equal width. A mesh takes of it what its `face_modes` polynomials over the face can follow.
-        opening: gap by everything else than the force of this mesh, in every slice; None for none.
+        gears: gear pair.
+        matrix: influence matrix [um/N], shape (slices, slices), for slices of equal width: gap that opens in one slice
+            under a unit force between the flanks in another slice. A mesh represents it by `face_modes` polynomials
+            over the face.
+        opening: gap in every slice without the force of this mesh [um], shape (slices,); None for none.
 
     Raises:
-        ValueError: for a matrix that is not square and symmetric, and other numbers of slices.
+        ValueError: for a matrix that is not square and symmetric, or an `opening` with another number of slices.
     """
 
     gears: GearPair
@@ -98,19 +99,19 @@ class TabulatedSupport(AbstractSupport):
 
     @property
     def tabulated(self) -> Float[Array, "slices slices"]:
-        """`matrix`."""
+        """Influence matrix as given [um/N], shape (slices, slices)."""
         return self.matrix
 
     @property
     def status(self) -> Statuses:
-        """Whether all numbers are in their ranges, the gears can run, and no eigenvalue of the matrix is negative."""
+        """Status of the checks: numbers in their ranges, gears that can run, and a positive semidefinite matrix."""
         return _status(self.gears, within_limits(self) & semidefinite(symmetric(self.matrix)))
 
     def influence(self, y: Slices) -> Float[Array, "slices slices"]:
-        """`matrix`, its symmetric part.
+        """Symmetric part of `matrix` [um/N], shape (slices, slices).
 
         Raises:
-            ValueError: for another number of slices.
+            ValueError: if the number of slices differs from that of the matrix.
         """
         if len(y) != len(self.matrix):
             raise ValueError(
@@ -120,19 +121,19 @@ class TabulatedSupport(AbstractSupport):
         return symmetric(self.matrix)
 
     def gap(self, y: Slices) -> Slices:
-        """`opening`."""
+        """Gap without the force of this mesh, `opening` or zero [um], shape (slices,)."""
         return jnp.zeros(len(y)) if self.opening is None else self.opening
 
 
 class ShaftSupport(AbstractSupport):
-    """The shafts of a gearbox at one of its meshes; made by `support`.
+    """Support of a mesh by the shafts of a gearbox; made by `support`.
 
     Attributes:
-        gearbox: with the torques of its couplings.
-        mesh: number of the mesh, from 0.
+        gearbox: gearbox, with the torques of its couplings.
+        mesh: index of the mesh, from 0.
 
     Raises:
-        ValueError: for a number that no mesh has.
+        ValueError: for an index without a mesh.
     """
 
     gearbox: Gearbox
@@ -145,7 +146,7 @@ class ShaftSupport(AbstractSupport):
 
     @property
     def pair(self) -> GearPair:
-        """The gears of the mesh."""
+        """Gear pair of the mesh."""
         return self.gearbox.pair(self.mesh)
 
     @property
@@ -159,15 +160,16 @@ class ShaftSupport(AbstractSupport):
         return self.gearbox.status
 
     def influence(self, y: Slices) -> Float[Array, "slices slices"]:
-        """Bending, shear, torsion, bearings and housing of both shafts, and of all others through the housing.
+        """Influence matrix of shafts, bearings and housing at face coordinates [um/N], shape (slices, slices).
 
-        The torque of a unit force leaves each shaft at the end of the face behind which most of it leaves: rotations
-        count from there. What the shaft winds up between its face and a coupling turns the whole gear and is not in it.
+        It includes bending, shear, torsion, bearings and housing of both shafts, and the other shafts by way of the
+        housing. The twist of a shaft is measured from the end of the face towards which most of its torque leaves. The
+        wind-up between face and coupling turns the gear as a whole and is not included.
         """
         return _influence(self, real(y))
 
     def gap(self, y: Slices) -> Slices:
-        """Gap due to misalignment, external loads and other meshes with forces even over their faces [um]."""
+        """Gap due to misalignment, external loads, and other meshes with even line loads [um], shape (slices,)."""
         return _gap(self, real(y))
 
 
@@ -176,10 +178,10 @@ def support(gearbox: Gearbox, mesh: int = 0) -> ShaftSupport:
 
     Args:
         gearbox: shafts, meshes, housing.
-        mesh: number of the mesh, from 0.
+        mesh: index of the mesh, from 0.
 
     Raises:
-        ValueError: for a number that no mesh has.
+        ValueError: for an index without a mesh.
     """
     return ShaftSupport(gearbox, mesh)
 
@@ -225,5 +227,5 @@ def _twist_between(
 
 
 def even_coordinates(width: Given, slices: int) -> Slices:
-    """Middles of slices of equal width over a face [mm]."""
+    """Face coordinates of the middles of slices of equal width [mm], shape (slices,)."""
     return real(width) * ((np.arange(slices) + 0.5) / slices - 0.5)

@@ -1,4 +1,4 @@
-"""Axes that are not parallel, as a deviation over the face width in the plane of action."""
+"""Misalignment of the axes, as a deviation over the face width in the plane of action."""
 
 import jax.numpy as jnp
 from jaxtyping import Array, Float
@@ -15,13 +15,13 @@ _INCLINATION = 2.0  # f_Sigma_delta over f_Sigma_beta
 
 
 class Misalignment(Checked):
-    """Deviation of the axes of a pair from being parallel.
+    """Deviation from parallelism of the axes of a pair.
 
     Attributes:
         skew: f_Sigma_beta, out of the plane of the axes, over the bearing span [um].
         inclination: f_Sigma_delta, in the plane of the axes, over the bearing span [um].
-        bearing_span: L, over which both are measured [mm]; None without them.
-        direct: f_ma over the face width in the plane of action, as a number of its own [um].
+        bearing_span: L, length over which skew and inclination are measured [mm]; None without them.
+        direct: f_ma over the face width in the plane of action, in addition to skew and inclination [um].
 
     Positive values open the gap at positive face coordinates, as a positive lead slope does.
 
@@ -45,7 +45,7 @@ class Misalignment(Checked):
 
     @property
     def varies_along_face(self) -> bool:
-        """Whether it opens the gap at all, which a mesh of one slice cannot show; a traced one may."""
+        """True if the misalignment is not known to be zero; a mesh of one slice cannot represent it."""
         return any(acts(value) for value in (self.skew, self.inclination, self.direct))
 
     def over_face(self, pair: GearPair) -> Scalar:
@@ -58,7 +58,7 @@ class Misalignment(Checked):
 
 
 def axis_tolerance(helix_deviation: Given, face_width: Given, bearing_span: Given) -> Misalignment:
-    """Largest deviations of the axes by ISO/TR 10064-3, both in the worse direction.
+    """Largest permissible deviations of the axes by ISO/TR 10064-3, both with the sign that adds up.
 
     f_Sigma_beta = 0.5 (L / b) F_beta and f_Sigma_delta = 2 f_Sigma_beta, quoted from secondary sources.
 

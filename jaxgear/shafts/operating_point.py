@@ -1,14 +1,12 @@
-"""Bearings with radial clearance, at the loads of a gearbox.
+"""Bearings with radial clearance, linearized at the loads of a gearbox.
 
-A bearing with clearance c resists with k max(0, |u| - c) in the direction in which the shaft lies against it: the
-stiffness across that direction is force over displacement, k (1 - c / |u|). One that does not touch holds nothing
-radially; its axial and tilting stiffness act whatever the clearance. The state under all loads, the force of every mesh
-even over its face, is found by Newton's method. What the load of a mesh changes about it is taken by the tangent there:
-its sum and direction are those of the state, so that only its distribution over the face is seen linearly. Without
-clearances all of it is linear and exact.
+A bearing with clearance c resists with k max(0, |u| - c) in the direction of the displacement u; the stiffness across
+that direction is force over displacement, k (1 - c / |u|). A bearing without contact has no radial stiffness; axial and
+tilting stiffness do not depend on the clearance. Newton's method finds the state under all loads, with mesh forces even
+over their faces. A change of the distribution of a mesh force over its face is treated by the tangent at this state;
+the sum and direction of the force are those of the state. Without clearances the system is linear and exact.
 
-Where the loads leave a shaft afloat in its clearances nothing holds it, and results are NaN, as where Newton's method
-finds no state.
+Results are NaN if a shaft floats in its clearances without contact, and if Newton's method does not converge.
 """
 
 from functools import partial
@@ -23,12 +21,12 @@ from .loads import Patterns, System, load_pattern, solve, system
 from .stepped_beam import DIRECTIONS
 
 _WAYS = len(DIRECTIONS)
-# What may be left of the conditions, relative to the largest load, over the square root of rounding.
+# Tolerance of the residual, relative to the largest load, over the square root of the machine precision.
 _SOLVED = 1e-2
 
 
 def system_under_load(gearbox: Gearbox, patterns: list[Patterns]) -> System:
-    """`system`, with the tangent of bearings with clearance at the loads of the gearbox."""
+    """Equations of a gearbox as `system`, with bearings with clearance replaced by their tangent at the loads."""
     found = system(gearbox, patterns)
     plays = [bearing.play for shaft in gearbox.shafts for bearing in shaft.bearings]
     if all(play is None for play in plays):
@@ -43,7 +41,7 @@ def system_under_load(gearbox: Gearbox, patterns: list[Patterns]) -> System:
 def _force(
     stiffness: Float[Array, "b b"], clearance: Float[Array, " bearings"], moved: Float[Array, " b"]
 ) -> Float[Array, " b"]:
-    """Resistance of the bearings to displacements of their shafts against their seats [N, N mm]."""
+    """Resisting forces of bearings with clearance [um], for displacements of shafts against seats [N, N mm]."""
     each = moved.reshape(-1, _WAYS)
     square = each[:, 0] ** 2 + each[:, 1] ** 2
     touching = square > clearance**2
@@ -54,9 +52,9 @@ def _force(
 
 
 def _state(of: System, clearance: Float[Array, " bearings"]) -> Float[Array, " b"]:
-    """Displacement of the shafts against the seats under the one load of a system."""
+    """Displacements of the shafts against the seats under the single load of a system [um, mrad]."""
     count = len(of.bearings)
-    # start and scales only, on which the root does not depend; of no load the direction has no derivative
+    # only start and scales, on which the root does not depend; the direction has no derivative at zero load
     linear = jax.lax.stop_gradient(solve(of, jnp.ones((1, 1))))
     resisted = -linear.force[:, 0].reshape(-1, _WAYS)
     size = jnp.sqrt(jnp.sum(resisted[:, :2] ** 2, axis=1, keepdims=True))
@@ -64,7 +62,7 @@ def _state(of: System, clearance: Float[Array, " bearings"]) -> Float[Array, " b
     played = jnp.concatenate([clearance[:, None] * along, jnp.zeros_like(resisted[:, 2:])], axis=1).ravel()
     inner, across = of.flexibility[:count, :count] + of.housing, of.flexibility[:count, count]
     here, there = of.moving[:count], of.moving[count]
-    # without clearance each shaft lies where the linear solution has it; with it, as far farther as the bearings let it
+    # start: the linear solution, moved on by the clearance in the direction of the bearing force
     bent = linear.bearing[:, 0] - linear.seat[:, 0]
     arm = jnp.maximum(jnp.max(jnp.abs(here), axis=0), 1.0)
     moves = here / arm[None]

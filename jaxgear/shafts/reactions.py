@@ -1,4 +1,4 @@
-"""Forces and displacements of bearings, elastic lines of shafts, under the loads of a gearbox."""
+"""Bearing reactions and elastic lines of shafts under the loads of a gearbox."""
 
 from dataclasses import replace
 
@@ -19,13 +19,14 @@ _ROUNDED = 1 + 1e-6  # an end of a shaft in single precision
 
 
 class BearingReactions(Checked):
-    """Bearings in the order of their shafts; axes (bearings, directions), directions x, y, z, rx, ry.
+    """Forces and displacements at the bearings, in the order of their shafts; directions are x, y, z, rx, ry.
 
     Attributes:
-        names: of the bearings.
-        force: of the shafts on the bearings, N and N mm; printed are the radial and the axial one.
-        shaft: displacement of the shafts at the bearings, um and mrad.
-        seat: displacement of the housing there, um and mrad.
+        names: names of the bearings.
+        force: force of the shafts on the bearings [N, N mm], shape (bearings, directions); `print` shows radial and
+            axial force.
+        shaft: displacement of the shafts at the bearings [um, mrad], shape (bearings, directions).
+        seat: displacement of the housing at the bearings [um, mrad], shape (bearings, directions).
     """
 
     names: tuple[str, ...] = eqx.field(static=True)
@@ -45,12 +46,12 @@ class BearingReactions(Checked):
 
 
 class ElasticLine(Checked):
-    """A shaft under load, at given places.
+    """Deformation of a shaft under load at given positions.
 
     Attributes:
-        position: from the left end of the shaft.
-        displacement: in x, y, z, rx, ry, um and mrad, shape (points, 5).
-        twist: against the left end, positive in the direction in which the shaft turns.
+        position: distance from the left end of the shaft [mm], shape (points,).
+        displacement: displacement in x, y, z, rx, ry [um, mrad], shape (points, 5).
+        twist: twist against the left end, positive in the sense of rotation of the shaft [mrad], shape (points,).
     """
 
     position: Float[Array, " points"] = result("mm")
@@ -59,12 +60,12 @@ class ElasticLine(Checked):
 
 
 def bearing_reactions(gearbox: Gearbox) -> BearingReactions:
-    """Bearings under all loads of a gearbox, the force of every mesh even over its face; NaN where nothing holds it."""
+    """Bearing reactions under all loads, with mesh forces even over their faces; NaN for an unsupported shaft."""
     return _reactions(gearbox)
 
 
 def with_and_without_housing(gearbox: Gearbox) -> tuple[BearingReactions, BearingReactions]:
-    """`bearing_reactions` in the housing and on rigid seats, for a table of both.
+    """Bearing reactions in the housing and on rigid seats, for a comparison.
 
     Raises:
         ValueError: for a gearbox without a housing.
@@ -75,12 +76,12 @@ def with_and_without_housing(gearbox: Gearbox) -> tuple[BearingReactions, Bearin
 
 
 def elastic_line(gearbox: Gearbox, shaft: str, position: Numbers) -> ElasticLine:
-    """Displacements and twist of a shaft under all loads, the force of every mesh even over its face.
+    """Displacements and twist of a shaft under all loads, with mesh forces even over their faces.
 
     Args:
-        gearbox: with the torques of its couplings.
-        shaft: name.
-        position: from the left end [mm], shape (points,).
+        gearbox: gearbox, with the torques of its couplings.
+        shaft: name of the shaft.
+        position: distance from the left end of the shaft [mm], shape (points,).
 
     Raises:
         ValueError: for an unknown shaft, or a position beyond its ends.
@@ -113,9 +114,9 @@ def _line(gearbox: Gearbox, shaft: int, position: Float[Array, " points"]) -> El
         :-1, 0
     ]
     at, torque = torques_on(gearbox, shaft)
-    # of two torques that turn a shaft against each other, the one on the left holds
+    # of two torques that twist a shaft against each other, the left one is taken as the reaction
     turned = twist(gearbox.shafts[shaft].beam, jnp.minimum(position[:, None], at[None, :])) @ torque
-    # no answer of a traced shaft that cannot be
+    # NaN for a traced shaft that is not valid
     possible = gearbox.status == Status.CONVERGED
     bent, turned = (jnp.where(possible, each, jnp.nan) for each in (found.reshape(count, _WAYS), turned))
     return ElasticLine(position, bent, turned)

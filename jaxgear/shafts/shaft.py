@@ -25,11 +25,11 @@ Scalar = Float[Array, ""]
 
 
 class Section(Checked):
-    """Part of a shaft with one cross-section.
+    """Section of a shaft with constant diameters.
 
     Attributes:
-        length: [mm].
-        diameter: outer [mm].
+        length: length of the section [mm].
+        diameter: outer diameter [mm].
         bore: inner diameter [mm].
     """
 
@@ -47,11 +47,11 @@ class MountedGear(Checked):
     """A gear on a shaft.
 
     Attributes:
-        name: by which a mesh refers to it.
-        gear: the gear; its face width is that of the body.
-        position: of the middle of its face, from the left end of the shaft [mm].
-        body_diameter: outer diameter of the shaft over the face width [mm], by which the gear body stiffens it: of an
-            integral pinion `integral_diameter`, of a pressed or keyed wheel less; None where the body does not stiffen.
+        name: name of the gear, used by a mesh.
+        gear: the gear; its face width is the width of the gear body.
+        position: distance of the middle of the face from the left end of the shaft [mm].
+        body_diameter: effective diameter of the shaft over the face width [mm], for stiffening by the gear body:
+            `integral_diameter` for an integral pinion, less for a pressed or keyed wheel; None for no stiffening.
     """
 
     name: str = eqx.field(static=True)
@@ -71,12 +71,12 @@ class MountedGear(Checked):
 
 
 class Coupling(Checked):
-    """Where torque enters or leaves a gearbox.
+    """Coupling at which torque enters or leaves a gearbox.
 
     Attributes:
-        position: from the left end of the shaft [mm].
-        torque: positive where it drives the shaft, negative where the shaft gives it away [N m]; None for what is left
-            of the others, at one coupling of a gearbox.
+        position: distance from the left end of the shaft [mm].
+        torque: torque on the shaft [N m], positive for an input, negative for an output; None at one coupling of a
+            gearbox, whose torque balances the others.
     """
 
     position: Scalar = number("mm")
@@ -84,12 +84,12 @@ class Coupling(Checked):
 
 
 class ShaftLoad(Checked):
-    """Force and moment from outside: belt, weight, overhung impeller.
+    """External force and moment: belt, weight, overhung impeller.
 
     Attributes:
-        position: from the left end of the shaft [mm].
-        force: in x, y and z [N].
-        moment: about x and y [N m]; torque enters by a `Coupling`.
+        position: distance from the left end of the shaft [mm].
+        force: force in x, y and z [N], shape (3,).
+        moment: moment about x and y [N m], shape (2,); a torque needs a `Coupling`.
     """
 
     position: Scalar = number("mm")
@@ -108,17 +108,17 @@ class ShaftLoad(Checked):
 
 
 def integral_diameter(gear: Gear) -> Scalar:
-    """Diameter of a shaft that is as stiff as a gear cut into it [mm].
+    """Diameter of a plain shaft that is as stiff as an integral gear [mm].
 
-    d + 2 x m - h_fP m, halfway between reference circle and root circle of an unshifted gear: the torsion diameter
-    d - m h_aP0 with which a straight torsional wind-up agrees with a program of influence numbers within 0.3 %.
+    d + 2 x m - h_fP m, halfway between reference circle and root circle for an unshifted gear. This is the torsion
+    diameter d - m h_aP0, whose torsional wind-up agrees with a program of influence numbers within 0.3 %.
     """
     return 2 * gear.root_circle_radius + gear.dedendum * gear.module
 
 
 OfGears = Float[Array, " gears"]
 
-# A shaft is held where its bearings resist every movement by at least this share of what they resist all together.
+# A shaft is supported if the least stiffness against a rigid-body displacement exceeds this share of the total.
 _SUPPORTED = 1e-9
 _ROUNDING = 1e-6  # of a sum of lengths, in single precision too
 
@@ -127,19 +127,18 @@ class Shaft(Checked):
     """Stepped shaft: Timoshenko beam in bending, with torsion and tension.
 
     Attributes:
-        name: of the shaft.
-        sections: from left to right.
-        bearings: that hold it.
-        gears: on it, which stiffen it where they have a body diameter.
-        couplings: where torque enters and leaves.
-        loads: from outside.
-        material: of shaft and gear bodies.
+        name: name of the shaft.
+        sections: sections from left to right.
+        bearings: bearings of the shaft.
+        gears: gears on the shaft, which stiffen it if they have a body diameter.
+        couplings: couplings at which torque enters and leaves.
+        loads: external loads.
+        material: material of shaft and gear bodies.
 
     Raises:
-        ValueError: for something beyond the ends of the shaft, gears that overlap, a shaft or body as thick as the
-            gear, a body that the shaft is thicker than anyhow, or bearings that do not hold the shaft: one of no
-            tilting stiffness leaves it free to turn, none to move. A shaft without axial stiffness is taken as held
-            axially unless something pushes it that way.
+        ValueError: for a part beyond the ends of the shaft, gears that overlap, a shaft or body as thick as the gear, a
+            body diameter below that of the shaft, or bearings that do not support the shaft against every displacement
+            and tilting. Axial support is required only if an axial force acts on the shaft.
     """
 
     name: str = eqx.field(static=True)
@@ -158,12 +157,12 @@ class Shaft(Checked):
 
     @property
     def length(self) -> Scalar:
-        """[mm]"""
+        """Length of the shaft [mm]."""
         return sum((section.length for section in self.sections), jnp.zeros(()))
 
     @property
     def beam(self) -> SteppedBeam:
-        """The pieces between all steps of the diameters, gear bodies included."""
+        """Stepped beam of the shaft, with a piece between every two steps of the diameters, gear bodies included."""
         ends = jnp.cumsum(jnp.stack([section.length for section in self.sections]))
         bodies = [(gear, gear.body_diameter) for gear in self.gears if gear.body_diameter is not None]
         faces = [end for gear, _ in bodies for end in (gear.start, gear.end)]
@@ -180,11 +179,11 @@ class Shaft(Checked):
 
     @property
     def valid(self) -> Bool[Array, ""]:
-        """True if the shaft passes its checks; concrete shafts that do not are refused, traced ones flagged."""
+        """True if the shaft passes its checks; a concrete shaft that fails them raises an error when it is made."""
         return _holds(facts_of(self))
 
     def _named(self) -> tuple[tuple[str, str], ...]:
-        """Places and names of what is on the shaft, in the order of `ShaftFacts.low`."""
+        """Keys and names of the parts on the shaft, in the order of `ShaftFacts.low`."""
         return (
             *((f"bearings[{index}]", f'bearing "{item.name}"') for index, item in enumerate(self.bearings)),
             *((f"gears[{index}]", f'gear "{item.name}"') for index, item in enumerate(self.gears)),
@@ -194,10 +193,10 @@ class Shaft(Checked):
 
 
 class ShaftError(ValueError):
-    """A shaft that cannot be.
+    """Error of a shaft that is not valid.
 
     Attributes:
-        part: what of the shaft is wrong, as `bearings[1].position`; "" where it is no single part.
+        part: key of the faulty part, such as `bearings[1].position`; "" if it is not a single part.
     """
 
     def __init__(self, part: str, problem: str) -> None:
@@ -206,19 +205,19 @@ class ShaftError(ValueError):
 
 
 class ShaftFacts(NamedTuple):
-    """Numbers by which a shaft is checked: errors of concrete numbers, status of traced ones.
+    """Values for the checks of a shaft: errors for concrete numbers, a status for traced ones.
 
     Attributes:
-        length: of the shaft [mm].
-        low, high: ends of everything on it [mm].
+        length: length of the shaft [mm].
+        low, high: ends of all parts on the shaft [mm], shape (items,).
         inside: for every item, True if it lies within the shaft.
         hollow: for every section, True if its bore is less than its diameter.
         thinnest, thickest: smallest and largest diameter of the sections under the face of every gear [mm].
         body: body diameter of every gear, 0 where it has none [mm].
         tip: tip diameter of every gear [mm].
         overlap: True if the faces of two gears have more than an end in common.
-        held: True if the bearings resist every rigid movement in x, y, rx, ry.
-        axial: True if the bearings resist axial movement, or if neither loads nor helical gears push axially.
+        held: True if the bearings resist every rigid-body displacement in x, y, rx, ry.
+        axial: True if the bearings resist axial displacement, or if neither loads nor helical gears act axially.
     """
 
     length: Scalar
@@ -272,7 +271,7 @@ def facts_of(shaft: Shaft) -> ShaftFacts:
 
 
 def _held(shaft: Shaft) -> Float[Array, "5 5"]:
-    """Stiffness of all bearings against movements of the whole shaft, rotations as displacements of its ends."""
+    """Stiffness of all bearings against rigid-body displacements, rotations as displacements at the shaft ends."""
     scale = jnp.stack([1.0, 1.0, 1.0, 1 / shaft.length, 1 / shaft.length])
     places = rigid(jnp.stack([item.position for item in shaft.bearings]))
     return sum(r.T @ item.matrix @ r for r, item in zip(places, shaft.bearings)) * scale[None] * scale[:, None]
@@ -292,7 +291,7 @@ def _holds(facts: ShaftFacts) -> Bool[Array, ""]:
 
 
 def _check(shaft: Shaft) -> None:
-    """Raises where a shaft of concrete numbers cannot be, or where a body has no effect."""
+    """Raise for a shaft of concrete numbers that is not valid, or for a gear body without effect."""
     if any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves(shaft)):
         return
     facts = facts_of(shaft)
@@ -304,7 +303,7 @@ def _check(shaft: Shaft) -> None:
 
 
 def _faults(shaft: Shaft, facts: ShaftFacts) -> Iterator[tuple[str, str]]:
-    """Parts that are wrong, and why."""
+    """Faulty parts, each with its message."""
     for (part, what), first, last, inside in zip(shaft._named(), facts.low, facts.high, facts.inside):
         if not inside:
             place = f"{first:g} mm" if first == last else f"{first:g} to {last:g} mm"

@@ -1,9 +1,9 @@
 """Elastic line of a stepped shaft: Timoshenko bending, torsion and tension by integrals of unit loads.
 
-A shaft is cut free and held at its left end alone. Its displacement at s under a unit load at t is then an integral
-over what both load, from the left end to the nearer of the two (principle of virtual work), for pieces of one
-cross-section a polynomial: exact wherever loads and points lie, without nodes, and differentiable in every position
-and diameter.
+A shaft is clamped at its left end, without bearings. Its displacement at s under a unit load at t is an integral from
+the left end to the nearer one of s and t (principle of virtual work). For pieces of constant cross-section the integral
+is a polynomial: it is exact for any positions of loads and points, needs no nodes, and is differentiable with respect
+to every position and diameter.
 
 Displacements are in um, rotations in mrad, forces in N, moments in N mm: force times displacement and moment times
 rotation are the same unit of work, so compliance matrices are symmetric.
@@ -20,22 +20,22 @@ from jaxtyping import Array, Bool, Float
 from ..geometry import Material
 from ..numerics import positive_definite
 
-# Entries that mirror each other may differ by this share of the largest ones in their row and column: what a file of
-# five or six digits leaves of a symmetric matrix.
+# Entries of a pair may differ by this share of the largest entries of their row and column: the rounding of a
+# symmetric matrix in a file of five or six digits.
 _ASYMMETRY = 1e-4
-# Smallest eigenvalue over the largest one that may be a rounding error of a semidefinite matrix.
+# Smallest ratio of the extreme eigenvalues that may be a rounding error of a semidefinite matrix.
 ROUNDING = 1e-9
 
 _Matrix = TypeVar("_Matrix", jax.Array, np.ndarray)
 
 
 def symmetric(matrix: _Matrix) -> _Matrix:
-    """Symmetric part of a matrix: derivatives see both entries of a pair."""
+    """Symmetric part of a matrix; its derivatives reach both entries of a pair."""
     return 0.5 * (matrix + matrix.T)
 
 
 def semidefinite(matrix: Float[Array, "n n"]) -> Bool[Array, ""]:
-    """Whether no eigenvalue of a symmetric matrix is negative, but for rounding; for traced ones."""
+    """True if a symmetric matrix has no negative eigenvalue, except for rounding; traceable."""
     # no eigenvalue is larger than the largest sum of a row
     largest = jnp.max(jnp.sum(jnp.abs(matrix), axis=1))
     small = max(ROUNDING, 10 * len(matrix) * float(jnp.finfo(matrix.dtype).eps)) * largest
@@ -44,7 +44,7 @@ def semidefinite(matrix: Float[Array, "n n"]) -> Bool[Array, ""]:
 
 
 def check_symmetric(name: str, matrix: np.ndarray, labels: Sequence[str] | None = None) -> None:
-    """Raises a one-line `ValueError` that names the entry that differs most from its mirror image."""
+    """Raise a one-line `ValueError` for a matrix that is not symmetric, with the entry of the largest difference."""
     scale = np.sqrt(np.abs(np.diag(matrix)))
     size = np.maximum(np.outer(scale, scale), np.finfo(float).tiny)
     apart = np.abs(matrix - matrix.T) / size
@@ -66,10 +66,10 @@ _UM = 1e3  # um per mm, mrad per rad
 
 
 class SteppedBeam(NamedTuple):
-    """Pieces of one cross-section each, from left to right; some may have no length.
+    """Pieces of constant cross-section, from left to right; some may have no length. All arrays have shape (pieces,).
 
     Attributes:
-        start, end: [mm].
+        start, end: ends of the pieces [mm].
         bending: curvature per bending moment [mrad/mm per N mm].
         shear: slope of the elastic line per shear force [um/mm per N].
         torsion: twist per length and torque [mrad/mm per N mm].
@@ -97,10 +97,10 @@ def shear_coefficient(bore_ratio: Float[Array, "..."], poisson_ratio: Float[Arra
 
 
 def beam(edges: Float[Array, " edges"], diameter: Pieces, bore: Pieces, material: Material) -> SteppedBeam:
-    """The pieces between neighbouring edges.
+    """Stepped beam with a piece between every two neighbouring edges.
 
     Args:
-        edges: ends of the pieces in ascending order [mm].
+        edges: ends of the pieces in ascending order [mm], shape (edges,).
         diameter, bore: outer and inner diameter of every piece [mm].
         material: of all pieces.
     """
@@ -120,14 +120,15 @@ def beam(edges: Float[Array, " edges"], diameter: Pieces, bore: Pieces, material
 
 
 def flexibility(held: SteppedBeam, at: Points) -> Float[Array, "points 5 points 5"]:
-    """Displacement at every point under unit loads at every other one, of the beam fixed at its left end.
+    """Displacements at all points under unit loads at all points, for the beam clamped at its left end.
 
     Args:
-        held: the pieces.
-        at: positions on the beam [mm].
+        held: the clamped beam.
+        at: positions on the beam [mm], shape (points,).
 
     Returns:
-        displacements x, y, z and rotations rx, ry per force and moment in the same directions.
+        displacements x, y, z and rotations rx, ry per force and moment in the same directions [um/N, mrad/N,
+        mrad/(N mm)], shape (points, 5, points, 5).
     """
     held = jax.tree.map(lambda leaf: leaf[None, None], held)
     s, t = at[:, None, None], at[None, :, None]
@@ -150,7 +151,7 @@ def flexibility(held: SteppedBeam, at: Points) -> Float[Array, "points 5 points 
 
 
 def rigid(at: Points) -> Float[Array, "points 5 5"]:
-    """Displacements of points by those of the left end, for a shaft that moves as a whole."""
+    """Displacements of points per rigid-body displacement of the left end, shape (points, 5, 5)."""
     one, zero = jnp.ones_like(at), jnp.zeros_like(at)
     rows = (
         (one, zero, zero, zero, at),

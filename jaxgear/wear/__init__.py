@@ -1,4 +1,4 @@
-"""Wear: the flank as a state, block by block of revolutions."""
+"""Wear of the flanks, computed in blocks of revolutions."""
 
 from .history import WearHistory as WearHistory
 from .history import wear as wear

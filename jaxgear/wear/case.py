@@ -1,4 +1,4 @@
-"""A mesh that wears: what its flanks are made of, how fast they wear, and the cycles on them."""
+"""Inputs of a wear analysis: mesh, loads, wear coefficients, flanks; and the contact on worn flanks."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -34,14 +34,15 @@ from .worn_volume import PARTS, Deposit, deposit, grid, worn
 
 
 class WornFlank(AbstractModification):
-    """Material worn off at the points of an even grid, on the lines of the slices of a mesh; linear between points.
+    """Wear depth on an evenly spaced grid along the profile, for every slice of a mesh; linear between grid points.
 
-    Constant beyond the ends, it is what `TabulatedProfile` and `TabulatedFlank` are at the slices of the mesh. They
-    search for the place of every contact, which takes far longer than the contact itself; here the place is a division.
+    The depth is constant beyond the ends of the grid. At the slices of the mesh the values are those of
+    `TabulatedProfile` and `TabulatedFlank`. These classes search for the grid interval of every contact, which takes
+    far longer than the contact itself; an even grid gives the interval by a division.
 
     Attributes:
-        roll_length: of the grid points, shape (points,).
-        amount: material removed, shape (slices, points).
+        roll_length: roll lengths of the grid points [mm], shape (points,).
+        amount: wear depth [um], shape (slices, points).
     """
 
     roll_length: Float[Array, " points"] = result("mm")
@@ -62,7 +63,7 @@ class WornFlank(AbstractModification):
 
 
 def every_other(depth: Float[Array, "*shape points"]) -> Float[Array, "*shape points"]:
-    """Depth that is known at every other point of an even grid only, linear between those; the last one is kept."""
+    """Depth interpolated linearly from every other point of an even grid; the last point keeps its value."""
     between = 0.5 * (depth[..., :-2:2] + depth[..., 2::2])
     return depth.at[..., 1:-1:2].set(between)
 
@@ -70,10 +71,10 @@ def every_other(depth: Float[Array, "*shape points"]) -> Float[Array, "*shape po
 def worn_through(
     pair: GearPair, roll_length: Float[Array, "gears points"], depth: Float[Array, "gears parts slices points"]
 ) -> Bool[Array, ""]:
-    """Whether nothing is left of a tooth of either gear somewhere up its flank.
+    """True if a tooth of either gear is worn through at some radius.
 
-    Material taken off all over an involute turns it about the gear by depth over base radius; there is none left where
-    that is the angle of the tooth.
+    A uniform depth on an involute turns the involute about the gear axis by depth / base radius. The tooth is worn
+    through where this angle reaches the angle of the tooth.
     """
     left = [
         2e3 * half_tooth_angle(gear, lengths) * gear.base_radius - jnp.max(jnp.sum(worn, axis=0), axis=0)
@@ -94,7 +95,7 @@ LARGEST_COEFFICIENT = 1e-13
 
 
 class Constant(eqx.Module):
-    """A coefficient of each gear [m2/N], shape (gears, 1, 1, 1)."""
+    """Constant wear coefficient of each gear [m2/N], shape (gears, 1, 1, 1)."""
 
     value: Field
 
@@ -103,7 +104,7 @@ class Constant(eqx.Module):
 
 
 class OfLubrication(eqx.Module):
-    """A function of pressure [MPa], sliding speed [m/s] and flash temperature [K] at every contact that is loaded."""
+    """Wear coefficient as a function of pressure [MPa], sliding speed [m/s] and flash temperature [K] of a contact."""
 
     of: Callable[..., Any]
 
@@ -177,7 +178,7 @@ FEWEST_POINTS, MOST_POINTS = 33, 97
 
 
 def points_for(positions: int) -> int:
-    """Points of the grid on each flank where none are asked for."""
+    """Default number of grid points on each flank."""
     return min(max(3 * positions // 2 + 1, FEWEST_POINTS), MOST_POINTS)
 
 
@@ -188,10 +189,10 @@ class Case(eqx.Module):
         mesh: prepared mesh.
         loads: operating points, with a leading axis (torques,).
         weights: shares of the revolutions, shape (torques,); None under one torque.
-        law: coefficient of wear of both gears at the contacts of a cycle.
+        law: wear coefficient of both gears at the contacts of a mesh cycle [m2/N].
         pinion, wheel: modifications of the new flanks.
-        deviation: material that manufacturing deviations remove besides [um].
-        points: of the grid on each flank.
+        deviation: material removed by manufacturing deviations [um], in addition to the modifications.
+        points: number of grid points along the profile of each flank.
         vibration: the vibrating system; None without dynamics.
     """
 
@@ -206,21 +207,21 @@ class Case(eqx.Module):
     vibration: Vibration | None = None
 
     def start(self) -> Depth:
-        """Flanks without wear."""
+        """Zero wear depth [um], shape (gears, parts, slices, points)."""
         gears, slices = len(self.mesh.sides), self.mesh.resolution.slices
         return jnp.zeros((gears, len(PARTS), slices, self.points), self.mesh.slice_width.dtype)
 
     @property
     def face_coordinate(self) -> Float[Array, "gears slices"]:
-        """Middle of every slice, from the middle of each gear's own face [mm]."""
+        """Face coordinate of the middle of every slice [mm], from the middle of the face of each gear."""
         return jnp.stack([self.mesh.face_coordinate + side.face_middle for side in self.mesh.sides])
 
     def places(self) -> Deposit:
-        """Where every load wears the flanks, leading axis (torques,)."""
+        """Mapping from the contacts to the grids on the flanks for every load, leading axis (torques,)."""
         return jax.vmap(lambda load: deposit(self.mesh, load.torque, self.points))(self.loads)
 
     def under(self, load: OperatingPoint, place: Deposit, depth: Depth) -> WearRate:
-        """The contact of worn flanks under one load, and how fast that wears them by one passage."""
+        """Contact of the worn flanks under one load, and the wear depth of one passage of a tooth pair [um]."""
         flanks = self._worn(place.roll_length, depth)
         removed = removed_material(self.mesh, load, **flanks) + self.deviation
         cycle = solve_removed(self.mesh, load, removed, **flanks)
@@ -234,7 +235,7 @@ class Case(eqx.Module):
         return WearRate(rate, found, jnp.maximum(status, cycle_status(cycle)))
 
     def _worn(self, roll_length, depth: Depth) -> Flanks:
-        """Both flanks with what is worn off them, as the contact analyses look it up."""
+        """Modifications of both flanks including wear, as `WornFlank` on the slices of the mesh."""
         total = jnp.sum(depth, axis=1)
         pinion, wheel = (WornFlank(lengths, amount) for lengths, amount in zip(roll_length, total))
         return {"pinion": self.pinion + pinion, "wheel": self.wheel + wheel}
@@ -242,14 +243,15 @@ class Case(eqx.Module):
     def _rate(self, cycle: MeshCycle, place: Deposit) -> tuple[Depth, Statuses]:
         """Wear depth of one passage [um], and the status of the coefficient: out of validity below 0 or NaN."""
         coefficient = self.law(cycle)
-        # a function may give anything: no flank is known that NaN or a negative coefficient has worn
+        # a function may return any value: NaN and negative coefficients are out of validity
         valid = jnp.all(coefficient >= 0)
         return worn(cycle.line_load, cycle.shift, coefficient, place), status_of({Status.OUT_OF_VALIDITY: ~valid})
 
     def _dynamic_rate(
         self, cycle: MeshCycle, motion: SteadyForce, removed: RemovedMaterial, place: Deposit
     ) -> tuple[Depth, Statuses]:
-        """`_rate` under the forces of a motion, the mean of its mesh cycles: each tooth takes part in all of them."""
+        """`_rate` under the mesh force of a motion, averaged over its mesh cycles: each tooth runs through all of them.
+        """
 
         def of_cycle(force):
             contact = solve_forces(self.mesh, jnp.maximum(force, 0.0), removed)
@@ -261,12 +263,13 @@ class Case(eqx.Module):
         return jnp.mean(rates, axis=0), status
 
     def flanks(self, roll_length: Float[Array, "gears points"], depth: Depth) -> dict[str, AbstractModification]:
-        """Both flanks with what is worn off them."""
+        """Modifications of both flanks including wear, as tables for any mesh."""
         pinion, wheel = tables(roll_length, self.face_coordinate, depth)
         return {"pinion": self.pinion + pinion, "wheel": self.wheel + wheel}
 
     def cycles(self, roll_length: Float[Array, "gears points"], marched: March) -> MeshCycle:
-        """The mesh on all flanks of a march, leading axis (steps,); (steps, torques) under a load spectrum."""
+        """Mesh cycles on the flanks at all time steps, leading axis (steps,); (steps, torques) under a load spectrum.
+        """
 
         def under(flanks, load: OperatingPoint, found) -> MeshCycle:
             return MeshCycle(
@@ -275,7 +278,7 @@ class Case(eqx.Module):
 
         def on(depth, found, status) -> MeshCycle:
             found = {name: found[name] for name in _FOUND}
-            # flanks that a contact has worn which was not found are not those of the history
+            # a contact that has not converged makes all later flanks invalid
             found = found | {"status": jnp.maximum(found["status"], status)}
             flanks = self.flanks(roll_length, depth)
             return jax.vmap(lambda load, of: under(flanks, load, of))(self.loads, found)
@@ -286,10 +289,10 @@ class Case(eqx.Module):
     def pressure_errors(
         self, roll_length: Float[Array, "gears points"], marched: March, cycles: MeshCycle
     ) -> Float[Array, "steps *torques"]:
-        """Estimated error of the largest flank pressure at all time steps of a march, as its `cycles` [MPa].
+        """Estimated error of the largest flank pressure at all time steps [MPa], axes as those of `cycles`.
 
-        By how much it changes where the worn flanks are known on every other point only, and where the contacts are as
-        wide as their own loads and curvatures make them instead of as the loads of unmodified flanks do.
+        The estimate is the change of the pressure with the worn flanks on every other grid point, and with contact
+        widths by the load and curvature of each contact instead of the loads of unmodified flanks.
         """
 
         def largest(depth, cycle: MeshCycle, load: OperatingPoint, line_load):
@@ -313,7 +316,7 @@ class Case(eqx.Module):
         return jnp.where(solved(cycles), jax.lax.map(on, (marched.depth, cycles)), jnp.nan)
 
     def dynamic_factor(self, marched: March) -> Float[Array, "steps *torques"] | None:
-        """Dynamic factor at all time steps of a march, axes as those of `cycles`; None without dynamics."""
+        """Dynamic factor at all time steps, axes as those of `cycles`; None without dynamics."""
         if self.vibration is None:
             return None
         found = jnp.where(marched.status[:, None] == Status.CONVERGED, marched.seen[_DYNAMIC_FACTOR], jnp.nan)
@@ -323,7 +326,7 @@ class Case(eqx.Module):
 def tables(
     roll_length: Float[Array, "gears points"], face_coordinate: Float[Array, "gears slices"], depth: Depth
 ) -> tuple[AbstractModification, AbstractModification]:
-    """Worn material (gears, parts, slices, points) as modifications of pinion and wheel."""
+    """Modifications of pinion and wheel from a wear depth [um], shape (gears, parts, slices, points)."""
     total = jnp.sum(depth, axis=1)
 
     def of(gear: int) -> AbstractModification:
@@ -335,7 +338,7 @@ def tables(
 
 
 def marched(case: Case, start: Depth, revolutions: Float[Array, " pairs"]) -> March:
-    """Wear of a case over pairs of blocks, see `march`."""
+    """Wear depth of a case after every block, see `march`."""
     return (_marched if case.vibration is None else _marched_quickly)(case, start, revolutions)
 
 
@@ -355,7 +358,7 @@ def _march(case: Case, start: Depth, revolutions: Float[Array, " pairs"]) -> Mar
     def over_loads(under):
         if case.vibration is None:
             return jax.vmap(under)(case.loads, places)
-        # one after the other: side by side orbits of one cycle would be worked out as those of many, too
+        # in sequence: in a batch, orbits of one mesh cycle would be computed over as many cycles as the longest orbit
         return jax.lax.map(lambda each: under(*each), (case.loads, places))
 
     found = march(analyze, start, revolutions)
@@ -379,7 +382,7 @@ def case_of(
     dynamics: Dynamics | None = None,
     line_load: LineLoad | None = None,
 ) -> Case:
-    """Checks and collects what wears; arguments and errors as `wear`."""
+    """Check the arguments of `wear` and collect them in a `Case`; raises the errors of `wear`."""
     check_mesh(mesh)
     pinion, wheel = flanks_of(mesh, pinion, wheel)
     dtype = mesh.slice_width.dtype
@@ -407,7 +410,7 @@ def _deviation(mesh: Mesh, deviation: Numbers | None) -> Float[Array, "*shape"]:
 
 
 def _loads(torque: Loads, dtype: np.dtype) -> tuple[OperatingPoint, Float[Array, " torques"] | None]:
-    """Operations with a leading axis (torques,), and the shares of a spectrum; None for a single load."""
+    """Operating points with a leading axis (torques,), and the weights of a spectrum; None for a single load."""
     if not isinstance(torque, LoadSpectrum):
         single = operating_point_of(torque, dtype)
         return jax.tree.map(lambda number: number[None], single), None

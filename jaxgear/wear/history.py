@@ -1,4 +1,4 @@
-"""Wear history: both flanks after every block of revolutions, and the mesh on them."""
+"""Wear history: wear depths of both flanks and mesh cycles after every block of revolutions."""
 
 from collections.abc import Callable
 from typing import Any
@@ -30,27 +30,27 @@ Keep = Callable[[Any, Callable[[], March]], March]
 
 
 class WearHistory(WithStatus, Checked):
-    """A pair of flanks at time steps: at the start of every block and after the last one.
+    """Wear of a pair of flanks at time steps: at the start of every block and after the last block.
 
     Attributes:
-        revolutions: of the pinion, shape (steps,).
-        roll_length: of the grid points of pinion and wheel [mm], shape (gears, points).
-        arc: of the flank that belongs to every point [mm], shape (gears, points).
-        face_coordinate: of the lines along the profile, from the middle of each gear's own face [mm], shape (gears,
+        revolutions: revolutions of the pinion, shape (steps,).
+        roll_length: roll lengths of the grid points of pinion and wheel [mm], shape (gears, points).
+        arc: arc length of the flank that belongs to every grid point [mm], shape (gears, points).
+        face_coordinate: face coordinates of the slices, from the middle of the face of each gear [mm], shape (gears,
             slices).
-        slice_width: of the face that belongs to every line [mm], shape (slices,).
-        depth: worn off pinion and wheel by contact of the flanks and by tip corners [um], shape (steps, gears, parts,
-            slices, points).
-        error: estimate of the error of that depth by the length of the blocks, largest of all points [um], shape
-            (steps,); NaN where that of two blocks has not converged.
-        pressure_error: estimate of the error of the largest flank pressure by the grid and by the width over which
+        slice_width: width of every slice [mm], shape (slices,).
+        depth: wear depth of pinion and wheel by contact of the flanks and by tip corners [um], shape (steps, gears,
+            parts, slices, points).
+        error: estimated error of the wear depth due to the length of the blocks, largest of all points [um], shape
+            (steps,); NaN where the comparison with a block of double length has not converged.
+        pressure_error: estimated error of the largest flank pressure due to the grid and to the width over which
             contacts average the worn flanks [MPa], shape (steps,), (steps, torques) under a load spectrum; zero on new
-            flanks, NaN on flanks that have not converged. It is not part of `error`, which is that of the blocks alone.
-        status: the worst so far, shape (steps,): of the contacts that have worn these flanks, also within blocks; of
-            the motion, the coefficient of wear, and what is left of the teeth.
-        cycles: the mesh on these flanks, leading axis (steps,); (steps, torques) under a load spectrum. None has
-            converged on flanks that have not.
-        weights: of the torques of a load spectrum in the revolutions, shape (torques,); None under one torque.
+            flanks, NaN on flanks that have not converged. It is not part of `error`, which covers the blocks only.
+        status: worst status up to every time step, shape (steps,): of all contacts that have worn the flanks, also
+            within blocks, of the motion, of the wear coefficient, and of the remaining tooth thickness.
+        cycles: mesh cycles on the flanks, leading axis (steps,); (steps, torques) under a load spectrum. A cycle is not
+            converged if the wear of its flanks is not.
+        weights: shares of the torques of a load spectrum in the revolutions, shape (torques,); None under one torque.
         dynamic_factor: largest mesh force of the steady motion over the static one, at the speed of the load (K_v),
             shape (steps,), (steps, torques) under a load spectrum; NaN where the motion does not settle on an orbit of
             up to four mesh cycles, and on flanks that have not converged. None without dynamics.
@@ -71,29 +71,29 @@ class WearHistory(WithStatus, Checked):
 
     @property
     def pinion_depth(self) -> Depths:
-        """Worn off the pinion in all [um], shape (steps, slices, points)."""
+        """Total wear depth of the pinion [um], shape (steps, slices, points)."""
         return jnp.sum(self.depth[..., 0, :, :, :], axis=-3)
 
     @property
     def wheel_depth(self) -> Depths:
-        """Worn off the wheel in all [um], shape (steps, slices, points)."""
+        """Total wear depth of the wheel [um], shape (steps, slices, points)."""
         return jnp.sum(self.depth[..., 1, :, :, :], axis=-3)
 
     @property
     def gears(self) -> tuple[Gear, Gear]:
         """Pinion and wheel."""
         pair = self.cycles.kinematics.pair
-        first = (0,) * self.cycles.batch_ndim  # of all time steps the same
+        first = (0,) * self.cycles.batch_ndim  # the gears are the same at all time steps
         pinion, wheel = jax.tree.map(lambda leaf: leaf[first], (pair.pinion, pair.wheel))
         return pinion, wheel
 
     def flanks(self, step: int = -1) -> tuple[AbstractModification, AbstractModification]:
         """Wear depth of pinion and wheel as modifications: `TabulatedProfile`, or `TabulatedFlank` over slices.
 
-        They add to the modifications of the new flanks. Interpolated linearly, they hold the worn volume.
+        They add to the modifications of the new flanks. Linear interpolation of the tables keeps the worn volume.
 
         Args:
-            step: which of the time steps; the last one by default.
+            step: index of the time step; the last one by default.
 
         Raises:
             IndexError: for a time step that does not exist.
@@ -121,58 +121,58 @@ def wear(
     keep: Keep | None = None,
     callback: Callback | None = None,
 ) -> WearHistory:
-    """Wear of both flanks, in blocks of revolutions: contact, wear, new flank, again.
+    """Wear of both flanks in blocks of revolutions; every block solves the contact and updates the flanks.
 
-    Every tooth of a gear wears alike. Differentiable with respect to every number in it, and for `jax.vmap`: all blocks
-    are one program then. With `largest_increment`, `keep` or `callback`, which take concrete numbers, every two blocks
-    are one call of a program, which serves any number of them.
+    All teeth of a gear wear alike. The result is differentiable with respect to every number and supports `jax.vmap`;
+    all blocks then are one program. `largest_increment`, `keep` and `callback` need concrete numbers; with them one
+    compiled program computes two blocks per call.
 
-    Wear levels the load, so that a block must not wear off more than the teeth deflect under their load: beyond
-    twice that, flanks overshoot from block to block. `error` tells; on smooth loads it falls with the square of the
-    number of blocks.
+    Wear levels the load. A block should therefore wear off less than the tooth deflection under load: above twice the
+    deflection the flanks overshoot from block to block. The field `error` of the result shows this; under smooth loads
+    it falls with the square of the number of blocks.
 
     Args:
         mesh: prepared mesh.
-        torque: on the pinion [N m], an `OperatingPoint`, or a `LoadSpectrum`. Its weights are shares of the
-            revolutions; those of one with a duration, `LoadSpectrum.from_hours`, are shares of the hours and count
-            times the speeds.
-        revolutions: of the pinion, all together.
-        coefficient: of wear [m2/N] of both gears, or a pair of numbers, (pinion, wheel); from 1e-18 for good films to
-            5e-16 for mild wear of mixed lubrication. Or a function of the state of lubrication at every contact, of
-            pressure [MPa], sliding speed [m/s] and flash temperature [K], arrays of shape (pairs, slices, positions),
-            to such an array or a pair of them; traced, and asked where there is load. It needs the speed of an
-            `OperatingPoint`. Flanks that NaN or a negative number have worn are out of validity. Where it depends on
-            numbers of its own to differentiate by, they may be fields of an `equinox.Module`.
+        torque: torque on the pinion [N m], an `OperatingPoint`, or a `LoadSpectrum`. The weights of a spectrum are
+            shares of the revolutions; the weights of a spectrum with a duration (`LoadSpectrum.from_hours`) are shares
+            of the hours and are multiplied by the speeds.
+        revolutions: total revolutions of the pinion.
+        coefficient: wear coefficient [m2/N] of both gears, or a pair of numbers (pinion, wheel); from 1e-18 for good
+            films to 5e-16 for mild wear in mixed lubrication. Or a function of pressure [MPa], sliding speed [m/s] and
+            flash temperature [K] at every contact, arrays of shape (pairs, slices, positions), which returns an array
+            of this shape or a pair of them; it is traced, its values count at loaded contacts, and it needs the speed
+            of an `OperatingPoint`. Wear by NaN or a negative coefficient is out of validity. Parameters of the function
+            that are to be differentiated may be fields of an `equinox.Module`.
         pinion, wheel: modifications of the new flanks; None for nominal involutes.
-        deviation: material that manufacturing deviations remove besides [um], shape (pairs, slices, positions);
-            None for nominal gears.
-        blocks: of equal length, even: two and two are compared with one of double length.
-        points: of the grid on each flank, evenly spaced from the start of the active profile to the tip; None for
-            one and a half times the positions, from 33 to 97. Points nearer to each other than the contact is wide show
-            no more, and pile up at the tip what the contact there would wear beyond it.
-        dynamics: what vibrates, its speeds aside: the motion is that at the speed of an `OperatingPoint`, or of every
-            load of a spectrum. None for no vibration.
-        line_load: "dynamic" for the flanks to wear under the elastic force of the steady motion that begins at rest,
-            found anew in every contact analysis: the contact at every mesh position is that under the force of the
-            motion there, and the wear is the mean of the mesh cycles of its orbit, as if every tooth took part in each
-            of them. Flanks have not converged where the motion does not settle on an orbit of up to four mesh cycles,
-            or where coast flanks touch, which do not wear here. "static" for dynamic factors alone. None for "dynamic"
-            with dynamics, "static" without.
-        largest_increment: depth that no block wears off beyond a tenth more [um], in place of `blocks`. It should stay
-            below what the teeth deflect under their load.
-        keep: called for every two blocks with all that they depend on and with what makes them; gives them, made now or
-            before. None to make them all.
-        callback: called as callback(revolutions so far, all of them, None) after every two blocks.
+        deviation: material removed by manufacturing deviations [um], in addition to the modifications, shape (pairs,
+            slices, positions); None for nominal gears.
+        blocks: even number of blocks of equal length; every two blocks are compared with one of double length.
+        points: number of grid points on each flank, evenly spaced from the start of the active profile to the tip;
+            None for one and a half times the positions, from 33 to 97. A spacing below the contact width shows no
+            further detail, and collects at the tip the wear of the part of the contact that lies beyond the tip.
+        dynamics: masses and damping of the vibration; its speeds are not used, the motion is computed at the speed of
+            the `OperatingPoint`, or of every load of a spectrum. None for no vibration.
+        line_load: "dynamic" for wear under the elastic mesh force of the steady motion from rest, computed anew in
+            every contact analysis. The contact at every mesh position carries the force of the motion there, and the
+            wear is the mean over the mesh cycles of the orbit, as if every tooth took part in each of them. The result
+            has not converged where the motion does not settle on an orbit of up to four mesh cycles, or where coast
+            flanks touch, whose wear is not modelled. "static" for wear under the static load, with dynamic factors as
+            a result only. None for "dynamic" with dynamics, "static" without.
+        largest_increment: limit of the wear depth per block [um], used instead of `blocks` and exceeded by a tenth at
+            most. It should be below the tooth deflection under load.
+        keep: function called for every two blocks with all inputs of the two blocks and the function that computes
+            them; it returns the two blocks, computed now or stored before. None to compute all blocks.
+        callback: called as callback(revolutions so far, total revolutions, None) after every two blocks.
 
     Returns:
-        flanks and mesh at the start of every block and after the last one.
+        wear depths and mesh cycles at the start of every block and after the last one.
 
     Raises:
         TypeError: for something else than a prepared mesh or a modification.
-        ValueError: for numbers out of their range, an odd number of blocks, a coefficient that is a function where
-            there is no speed, a load spectrum with hours without speeds, a torque that is not that of the gearbox which
-            holds the gears, dynamics without a speed, a dynamic load without dynamics, and whatever `solve` and
-            `mesh_force` refuse.
+        ValueError: for numbers out of their range, an odd number of blocks, a coefficient that is a function without a
+            speed, a load spectrum with hours but without speeds, a torque that differs from the torque of the gearbox
+            that supports the gears, dynamics without a speed, a dynamic load without dynamics, and for all errors of
+            `solve` and `mesh_force`.
     """
     check_blocks(blocks)
     flanks: dict[str, Any] = {"pinion": pinion, "wheel": wheel, "deviation": deviation}
@@ -192,14 +192,14 @@ def wear(
 
 
 def check_blocks(blocks: int) -> None:
-    """Raises a one-line `ValueError` for something else than an even number of blocks."""
+    """Raise a one-line `ValueError` if the number of blocks is not even or is below 2."""
     if whole("blocks", blocks, low=2) % BLOCKS_OF_A_PAIR:
         raise ValueError(f"blocks = {blocks} must be even: two and two are compared with one of double length")
 
 
 @program
 def history_of(case: Case, found: March, revolutions: Steps) -> WearHistory:
-    """The history of a march; `revolutions` at its time steps."""
+    """Wear history from a computed march; `revolutions` of the pinion at the time steps, shape (steps,)."""
     roll_length = grid(case.mesh, case.points)
     cycles = case.cycles(roll_length, found)
     return WearHistory(
@@ -228,14 +228,14 @@ def _total_error(error: Float[Array, "pairs gears parts slices points"]) -> Step
     return maximum(jnp.abs(steps), axis=(1, 2, 3))
 
 
-# Share of the revolutions in which the first rate of wear is found: short beside any block.
+# Share of the revolutions over which the wear rate of new flanks is determined: far shorter than a block.
 _TRIAL = 1e-9
-# A block that wears more than the increment by this factor is done again; the next one grows by the second at most.
+# A block whose wear exceeds the increment by the first factor is repeated; the next block grows by the second at most.
 _SLACK, _GROWTH = 1.1, 2.0
 
 
 def _by_pairs(case: Case, total: float, blocks: int, limit: float | None, keep, callback) -> WearHistory:
-    """`wear` pair by pair of blocks: of equal length, or as long as a limit of their wear allows."""
+    """Compute `wear` by pairs of blocks, of equal length or as long as the limit of the wear depth allows."""
     taken = keep or (lambda _, make: make())
 
     def two(start: Depth, length: float) -> March:
@@ -254,10 +254,10 @@ def _by_pairs(case: Case, total: float, blocks: int, limit: float | None, keep, 
             if most > _SLACK * limit and not lost:
                 continue
             lost = lost or bool(np.asarray(pair.status).any())
-            # the rest is gone through in pairs of one length, not in a last short one
+            # the remaining revolutions are split into pairs of equal length, without a short last pair
             rest = total - done - BLOCKS_OF_A_PAIR * now
             length = rest / (BLOCKS_OF_A_PAIR * max(1, np.ceil(rest / (BLOCKS_OF_A_PAIR * length) - 1e-9)))
-            if lost:  # the flanks of the rest have not converged, however short the blocks
+            if lost:  # later flanks do not converge either, however short the blocks
                 length = rest / BLOCKS_OF_A_PAIR
         at += [done + now, done + BLOCKS_OF_A_PAIR * now]
         done, left = at[-1], left - 1
@@ -271,26 +271,26 @@ def _by_pairs(case: Case, total: float, blocks: int, limit: float | None, keep, 
 
 
 def _first(two: Callable[[Depth, float], March], case: Case, total: float, limit: float) -> float:
-    """Length of the first block by the wear of new flanks."""
+    """Revolutions of the first block, from the wear rate of the new flanks."""
     most = _most(two(case.start(), _TRIAL * total)) / _TRIAL
     return total / (BLOCKS_OF_A_PAIR * max(1.0, np.ceil(most / (BLOCKS_OF_A_PAIR * limit))))
 
 
 def _most(pair: March) -> float:
-    """Largest depth that one of two blocks wears off [um]."""
+    """Largest wear depth of a single block of the pair [um]; 0 if it is not finite."""
     most = float(np.diff(np.asarray(pair.depth).sum(axis=2), axis=0).max())
     return most if np.isfinite(most) else 0.0
 
 
 @quick_jit
 def _together(pairs: list[March]) -> March:
-    """One march after the other: each begins with the flank with which the one before has ended."""
+    """Join consecutive marches: each one starts with the last flank of the previous one."""
 
     def joined(*leaves):
         return jnp.concatenate([*(leaf[:-1] for leaf in leaves), leaves[-1][-1:]])
 
     depth, seen = jax.tree.map(joined, *[(pair.depth, pair.seen) for pair in pairs])
-    # the flank with which a march begins has the status of that with which the one before has ended
+    # the first flank of a march takes the status of the last flank of the previous march
     status = jnp.concatenate([pairs[0].status[:1], *(pair.status[1:] for pair in pairs)])
     error = jnp.concatenate([pair.error for pair in pairs])
     return March(depth, error, jax.lax.cummax(status), seen)

@@ -1,8 +1,8 @@
-"""How wear goes on: contact, wear, new flank, and again, in blocks of revolutions.
+"""Integration of wear over revolutions in blocks: contact, wear rate, new flank.
 
-A block is a step of Heun's method for d depth / d revolutions. Two blocks of one length are compared with one of twice
-the length from the same flank: a third of what they differ by is the error of the two, of second order. All of it is
-one table of Runge and Kutta with five contact analyses, in one loop, so that the contact is compiled once.
+A block is a step of Heun's method for d depth / d revolutions. Two blocks of one length are compared with one block of
+twice the length from the same flank: a third of the difference is the error of the two, of second order. Both are one
+Runge-Kutta table with five contact analyses, in one loop, so that the contact is compiled once.
 """
 
 from collections.abc import Callable
@@ -19,8 +19,8 @@ Depth = Float[Array, "gears parts slices points"]
 
 BLOCKS_OF_A_PAIR = 2
 
-# Rates of wear that lead to the flank of every analysis, in blocks: at the start, at the end of the first block as
-# Euler sees it, after that block, and at the ends of the second and of the double one as Euler sees them.
+# Weights of the wear rates in the flank of every analysis, in blocks: at the start, at the end of the first block by
+# Euler's method, after the first block, and at the ends of the second and of the double block by Euler's method.
 _STAGES = np.array(
     [
         [0.0, 0.0, 0.0, 0.0, 0.0],
@@ -33,14 +33,14 @@ _STAGES = np.array(
 _BOTH = np.array([0.5, 0.5, 0.5, 0.5, 0.0])
 _DOUBLE = np.array([1.0, 0.0, 0.0, 0.0, 1.0])
 _ANALYSES = len(_STAGES)
-_DOUBLED = _ANALYSES - 1  # the analysis that the double block alone needs; before it come two of each block
+_DOUBLED = _ANALYSES - 1  # the analysis that only the double block needs; the four before it are two of each block
 _STARTS = 0, 2  # the analyses of flanks at the start of a block
-# If a block makes the error e, two make 2 e, and the double one, of third order each, 8 e.
+# Local errors are of third order: if a block has the error e, two have 2 e, and the double block has 8 e.
 _SHARE = 2 / (8 - 2)
 
 
 class WearRate(NamedTuple):
-    """The contact on a flank: how fast it wears [um per revolution], what else it gives, and its status."""
+    """Result of a contact analysis: wear rate [um per revolution], further results `seen`, and status."""
 
     rate: Depth
     seen: Any
@@ -48,14 +48,14 @@ class WearRate(NamedTuple):
 
 
 class March(NamedTuple):
-    """Flanks over many blocks.
+    """Wear depths over consecutive blocks.
 
     Attributes:
-        depth: at the start of every block and after the last one [um], leading axis (blocks + 1,).
-        error: estimate of what every pair of blocks adds to the error of the depth [um], leading axis (pairs,); NaN
-            where the contact of the double block was not found.
-        status: the worst of all contacts that have worn these flanks, shape (blocks + 1,).
-        seen: what the contact gave on these flanks, leading axis (blocks + 1,).
+        depth: wear depth at the start of every block and after the last one [um], leading axis (blocks + 1,).
+        error: estimated error of the depth added by every pair of blocks [um], leading axis (pairs,); NaN where the
+            contact of the double block has not converged.
+        status: worst status of all contacts that have worn the flanks, shape (blocks + 1,).
+        seen: further results of the contact on the flanks, leading axis (blocks + 1,).
     """
 
     depth: Float[Array, "steps gears parts slices points"]
@@ -65,16 +65,16 @@ class March(NamedTuple):
 
 
 def march(analyze: Callable[[Depth], WearRate], depth: Depth, revolutions: Float[Array, " pairs"]) -> March:
-    """Wear over pairs of blocks.
+    """Integrate the wear depth over pairs of blocks.
 
     Args:
-        analyze: the contact on a flank of some depth.
-        depth: at the start [um].
-        revolutions: of the pinion in each block of every pair.
+        analyze: contact analysis of flanks with a wear depth [um]; returns wear rate, further results and status.
+        depth: wear depth at the start [um], shape (gears, parts, slices, points).
+        revolutions: revolutions of the pinion in each block of every pair, shape (pairs,).
     """
     pairs, dtype = len(revolutions), depth.dtype
     stages, both, double = (jnp.asarray(table, dtype) for table in (_STAGES, _BOTH, _DOUBLE))
-    # the last flank is analysed too: the first stage of a pair that is not gone through
+    # the last flank is analysed too, as the first stage of a pair that is not computed
     number = jnp.arange(pairs * _ANALYSES + 1) % _ANALYSES
     length = jnp.append(jnp.repeat(revolutions, _ANALYSES), jnp.zeros((), dtype))
 
@@ -89,7 +89,7 @@ def march(analyze: Callable[[Depth], WearRate], depth: Depth, revolutions: Float
         return (start, rates), (flank, contact.seen, contact.status, _SHARE * (doubled - end))
 
     nothing = jnp.zeros((_ANALYSES, *depth.shape), dtype)
-    # backwards the contacts are found again instead of kept
+    # reverse mode solves the contacts again instead of storing them
     _, (flanks, seen, status, error) = jax.lax.scan(jax.checkpoint(analysis), (depth, nothing), (number, length))
     steps = np.append((np.arange(pairs)[:, None] * _ANALYSES + np.array(_STARTS)).ravel(), pairs * _ANALYSES)
     flanks, seen = jax.tree.map(lambda leaf: leaf[steps], (flanks, seen))

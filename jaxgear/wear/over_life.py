@@ -1,4 +1,4 @@
-"""Effect of wear on a mesh: quantities at every time step of a wear history, their mean, and the life to a limit."""
+"""Quantities of a worn mesh: values at every time step of a wear history, their mean, and the life to a limit."""
 
 from collections.abc import Callable
 from typing import Literal
@@ -22,16 +22,16 @@ _quantity_of = Vocabulary((*MESH_QUANTITIES.values(), *DYNAMIC_QUANTITIES.values
 
 
 def over_life(history: WearHistory, of: Measured, measure: AbstractMeasure | None = None) -> Steps:
-    """A quantity of the mesh at every time step, shape (steps,); NaN from a contact on that has not converged.
+    """Quantity of the mesh at every time step, shape (steps,); NaN from the first contact that has not converged.
 
     Args:
         history: wear history of one pair of flanks.
-        of: name of a quantity of `jaxgear.metrics`, a `Quantity`, as one that you have added, or a function of a cycle;
-            "dynamic_factor" is that of the dynamics of the life.
-        measure: how the torques of a load spectrum are joined; None for their mean.
+        of: name of a quantity of `jaxgear.metrics`, a `Quantity` (a custom one, too), or a function of a mesh cycle;
+            "dynamic_factor" is the dynamic factor of the wear history.
+        measure: measure over the torques of a load spectrum; None for their mean.
 
     Raises:
-        ValueError: for an unknown name, and for the dynamic factor of a life without dynamics.
+        ValueError: for an unknown name, and for the dynamic factor of a wear history without dynamics.
     """
     _single(history)
     quantity = _quantity_of(of)
@@ -45,26 +45,26 @@ def over_life(history: WearHistory, of: Measured, measure: AbstractMeasure | Non
 
 
 def _of_all_loads(history: WearHistory, values, better, measure: AbstractMeasure | None) -> Steps:
-    """Values (steps, torques) joined over the torques of a spectrum."""
+    """Apply the measure over the torques of a spectrum to values of shape (steps, torques); returns shape (steps,)."""
     if history.weights is None:
         return values
     many = jnp.stack([joined(measure or Mean(), row, history.weights, better) for row in values])
-    # a failed case of many is joined as an infinite one: of one pair of flanks nothing is known
+    # measures count a failed case among many as infinite; all torques wear the same flanks here, so the value is NaN
     return jnp.where(jnp.any(jnp.isnan(values), axis=-1), jnp.nan, many)
 
 
 def pressure_error(history: WearHistory, measure: AbstractMeasure | None = None) -> Steps:
     """Estimated error of the largest flank pressure at every time step [MPa], shape (steps,).
 
-    It is the change of the pressure with the worn flanks on every other grid point, and with the contact width of each
-    load. Arguments as for `over_life`.
+    The estimate is the change of the pressure with the worn flanks on every other grid point, and with the contact
+    width by the load of each contact. The arguments are those of `over_life`.
     """
     _single(history)
     return _of_all_loads(history, history.pressure_error, "smaller", measure)
 
 
 def mean_over_life(history: WearHistory, of: Measured, measure: AbstractMeasure | None = None) -> Scalar:
-    """Mean of a quantity over the revolutions of a life; arguments as for `over_life`."""
+    """Mean of a quantity over the revolutions of a wear history, in its unit; arguments as for `over_life`."""
     values, done = over_life(history, of, measure), history.revolutions
     return 0.5 * jnp.sum((values[1:] + values[:-1]) * jnp.diff(done)) / (done[-1] - done[0])
 
@@ -72,7 +72,7 @@ def mean_over_life(history: WearHistory, of: Measured, measure: AbstractMeasure 
 def wear_depth(history: WearHistory, gear: Worn = "both") -> Steps:
     """Largest wear depth of the flank of a gear, or of both, at every time step [um], shape (steps,).
 
-    NaN after a life whose contact was not found.
+    The depth is NaN at time steps that have not converged.
 
     Raises:
         ValueError: for another gear than "pinion", "wheel" or "both".
@@ -91,8 +91,8 @@ def wear_depth(history: WearHistory, gear: Worn = "both") -> Steps:
 def worn_volume(history: WearHistory) -> Float[Array, "steps gears parts"]:
     """Volume worn off one flank of every tooth of pinion and wheel, on the flank and at tip corners [mm3].
 
-    Where a gear wears at tip corners, its tip edge and its flank at the mate's tip corners count alike.
-    NaN after a life whose contact was not found.
+    The part "tip corners" of a gear adds the wear of its own tip edge and of its flank at the tip corners of the mate.
+    The volume is NaN at time steps that have not converged.
     """
     _single(history)
     volume = 1e-3 * jnp.einsum("lgpsk,gk,s->lgp", history.depth, history.arc, history.slice_width)
@@ -100,13 +100,13 @@ def worn_volume(history: WearHistory) -> Float[Array, "steps gears parts"]:
 
 
 def life_to_depth(history: WearHistory, limit: Given, gear: Worn = "both") -> Scalar:
-    """Revolutions of the pinion until the deepest wear reaches a limit [um].
+    """Revolutions of the pinion until the largest wear depth reaches a limit [um], shape ().
 
-    Between two time steps the depth is linear; beyond the last one it is extrapolated from the last block. Infinite
-    where nothing wears.
+    The depth is linear between two time steps and is extrapolated from the last block beyond the last one. The life is
+    infinite without wear.
 
     Raises:
-        ValueError: for a limit that is not greater than 0, and as `wear_depth`.
+        ValueError: for a limit that is not greater than 0, and for a gear that `wear_depth` does not accept.
     """
     limit = real(limit).astype(history.revolutions.dtype)
     check("limit", limit, "um", low=0.0, open_low=True)
@@ -114,14 +114,14 @@ def life_to_depth(history: WearHistory, limit: Given, gear: Worn = "both") -> Sc
 
 
 def life_to(history: WearHistory, of: Measured, limit: Given, measure: AbstractMeasure | None = None) -> Scalar:
-    """Revolutions of the pinion until a quantity first passes a limit on its bad side; infinite where it never does.
+    """Revolutions of the pinion until a quantity first violates a limit, shape (); infinite if it never does.
 
-    Between two time steps the quantity is linear. Zero where the new flanks exceed the limit; NaN where the contact has
-    not converged before.
+    The quantity is linear between two time steps. The life is zero if the new flanks violate the limit, and NaN if the
+    contact has not converged before the limit is reached.
 
     Args:
         history, of, measure: as for `over_life`.
-        limit: in the unit of the quantity.
+        limit: limit in the unit of the quantity; a lower limit for quantities whose larger values are better.
     """
     quantity = _quantity_of(of)
     limit = real(limit).astype(history.revolutions.dtype)
@@ -131,7 +131,7 @@ def life_to(history: WearHistory, of: Measured, limit: Given, measure: AbstractM
 
 
 def _single(history: WearHistory) -> None:
-    """Refuses histories of many designs: their axis would be taken for that of the time steps of one."""
+    """Raise for batched histories: the batch axis would be mistaken for the axis of the time steps."""
     if history.revolutions.ndim != 1:
         raise ValueError("history is of a batch of designs, must be of one: put jax.vmap around this function as well")
 
@@ -139,7 +139,7 @@ def _single(history: WearHistory) -> None:
 @quick_jit
 def _reached(done: Steps, values: Steps, limit: Scalar, *, goes_on: bool) -> Scalar:
     """Revolutions at which values first reach a limit, 0 at the start; infinite or extrapolated if they never do."""
-    # written so that NaN counts as reached, and is what comes out
+    # written so that NaN counts as reached and is returned
     beyond = ~(values < limit)
     last = len(done) - 2
     found = jnp.any(beyond)

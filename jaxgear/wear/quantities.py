@@ -1,7 +1,7 @@
-"""Numbers of worn flanks as quantities: objectives, limits, columns of sweeps.
+"""Results of a wear history as quantities: objectives, limits, columns of sweeps.
 
-A name alone does not say for how many revolutions, and with which coefficient of wear: `Wear.quantity` gives the
-quantity, and a design file has the table [wear].
+A quantity of wear needs revolutions and wear coefficients besides its name: `Wear.quantity` supplies them in Python,
+the table [wear] in a design file.
 """
 
 from collections.abc import Callable, Mapping
@@ -35,7 +35,8 @@ def _at_most(longest, history):
 
 
 def _pressure_error(history: WearHistory):
-    """Estimated error of the largest pressure of a life [MPa]; none at tip corners, which depend on no grid."""
+    """Estimated error of the largest pressure over a wear history [MPa]; pressures at tip corners have no grid error.
+    """
     largest = over_life(history, "max_contact_pressure")
     may_be = jnp.maximum(largest, over_life(history, "max_flank_pressure") + pressure_error(history))
     return maximum(may_be) - maximum(largest)
@@ -64,7 +65,7 @@ OF_HISTORY: Mapping[str, Callable[[WearHistory, Wear], Float[Array, ""]]] = {
 
 
 def number_of(name: str, history: WearHistory, settings: Wear) -> Float[Array, ""]:
-    """A quantity of a life that was worn by `Wear` settings; NaN as `Wear` says."""
+    """Value of a quantity of a wear history computed with `Wear` settings, shape (); NaN by the rules of `Wear`."""
     usable = jnp.all(solved(history.cycles)) & (name == _ERROR or blocks_are_short(history))
     return jnp.where(usable, OF_HISTORY[name](history, settings), jnp.nan)
 
@@ -81,7 +82,7 @@ def _life(analysis: Analysis, wear: Wear) -> WearHistory:
 
 
 def blocks_are_short(history: WearHistory) -> Bool[Array, ""]:
-    """Whether the blocks are short enough for the depth to mean something."""
+    """True if the blocks are short enough: no overshoot, and an estimated error within a tenth of the wear depth."""
     worn = jnp.sum(history.depth, axis=2)
     deflection = history.cycles.transmission_error[0] - history.cycles.unloaded_transmission_error[0]
     overshoots = maximum(jnp.abs(worn[1:] - worn[:-1])) > _MOST_IN_DEFLECTIONS * maximum(deflection)

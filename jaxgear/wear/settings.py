@@ -1,4 +1,4 @@
-"""Settings of wear: revolutions, wear coefficients and limits, and the quantities that are made of them."""
+"""Settings of wear: revolutions, wear coefficients, limits; and the quantities of wear."""
 
 from typing import Any
 
@@ -20,32 +20,32 @@ Scalar = Float[Array, ""]
 
 
 class Wear(AbstractSettings):
-    """How long a mesh runs, and how fast it wears.
+    """Settings of wear: revolutions, wear coefficients, limits, and the load that wears the flanks.
 
-    `quantity` gives with it the numbers of worn flanks, `WEAR_QUANTITIES`. With `loads` these wear one flank together,
-    independent of the load of the cycle. Without `loads`, every load of a spectrum and every manufactured pair has a
-    wear history of its own, and their numbers are joined as those of all cases. Under a spectrum join them by
-    `Worst()`, which is the number of a pair that runs at one of the loads; a mean joins numbers of different flanks.
+    `quantity` returns the quantities of worn flanks, `WEAR_QUANTITIES`. With `loads` the loads of that spectrum wear
+    one flank together, independent of the load of the mesh cycle. Without `loads`, every load of a spectrum and every
+    manufactured pair has its own wear history; a measure then joins the values of all cases. Use `Worst()` under a
+    spectrum: it is the value of a pair that runs at one of the loads, while a mean mixes different flanks.
 
-    A number is NaN where a contact has not converged, and where blocks are so long that flanks overshoot: the error of
-    the depth, as `wear_depth_error` estimates it, is more than a tenth of the depth, or a block wears off more than
-    twice the deflection of the new teeth. `wear_depth_error` itself is never NaN for this reason. The steps of the
-    integrator are those of the dynamics, or 256.
+    A quantity is NaN where a contact has not converged, and where the blocks are so long that flanks overshoot: the
+    error of the depth, estimated by `wear_depth_error`, exceeds a tenth of the depth, or a block wears off more than
+    twice the deflection of the new teeth. Long blocks do not make `wear_depth_error` itself NaN. The integrator uses
+    the number of steps of the dynamics, or 256.
 
     Attributes:
-        revolutions: of the pinion.
-        coefficient: of wear of the pinion, and of the wheel where it has none of its own: from 1e-18 for good films to
-            5e-16 for mild wear in mixed lubrication.
-        wheel_coefficient: of wear of the wheel; None for that of the pinion.
-        blocks: number of blocks of equal length, each a contact analysis and a step of wear; even.
-        largest_increment: depth that no block of a `history` wears off beyond a tenth more, in place of `blocks`; None
-            for blocks of equal length. Quantities take `blocks` in any case.
+        revolutions: total revolutions of the pinion.
+        coefficient: wear coefficient of the pinion, and of the wheel if `wheel_coefficient` is None: from 1e-18 for
+            good films to 5e-16 for mild wear in mixed lubrication.
+        wheel_coefficient: wear coefficient of the wheel; None for the wear coefficient of the pinion.
+        blocks: even number of blocks of equal length, each a contact analysis and a step of wear.
+        largest_increment: limit of the wear depth per block of a `history`, used instead of `blocks` and exceeded by a
+            tenth at most; None for blocks of equal length. Quantities always use `blocks`.
         points: number of grid points along each flank; None for one and a half times the positions, from 33 to 97.
         depth_limit: wear depth at which the life ends, for `life_to_depth`.
         ppte_limit: peak-to-peak transmission error at which the life ends, for `life_to_ppte`.
-        line_load: line load that wears the flanks: "static", or "dynamic" for that of the steady motion at the speed of
-            the load; None for "dynamic" with dynamics, "static" without.
-        dynamics: masses and damping, whose speeds are not used; None for no vibration.
+        line_load: line load that wears the flanks: "static", or "dynamic" for the line load of the steady motion at the
+            speed of the load; None for "dynamic" with dynamics, "static" without.
+        dynamics: masses and damping of the vibration, whose speeds are not used; None for no vibration.
         loads: load spectrum that wears one flank, its weights shares of the revolutions; None for the load of the
             cycle.
     """
@@ -85,17 +85,17 @@ class Wear(AbstractSettings):
         keep: Keep | None = None,
         callback: Callback | None = None,
     ) -> WearHistory:
-        """The wear history of a design; arguments and errors as `wear`.
+        """Wear history of a design by these settings; see `wear` for arguments and errors.
 
         Args:
             mesh: prepared mesh.
-            torque: on the pinion [N m], or an `OperatingPoint`; None, and only then, where the settings have loads.
+            torque: torque on the pinion [N m], or an `OperatingPoint`; None if the settings have loads.
             pinion, wheel: modifications of the new flanks.
-            deviation: material that manufacturing deviations remove besides [um].
-            keep, callback: as of `wear`.
+            deviation: material removed by manufacturing deviations [um], in addition to the modifications.
+            keep, callback: as for `wear`.
 
         Raises:
-            ValueError: for a torque beside loads, or neither.
+            ValueError: if both a torque and loads are given, or neither.
         """
         if (torque is None) == (self.loads is None):
             raise ValueError("Wear: give a torque where there are no loads, and none where there are")

@@ -1,4 +1,4 @@
-"""The load of teeth that vibrate: forces of the steady motion to which worn flanks are driven."""
+"""Mesh forces of the steady vibration on worn flanks."""
 
 from typing import Any, Literal, get_args
 
@@ -24,12 +24,12 @@ class Vibration(eqx.Module):
     """Vibrating system of a mesh that wears.
 
     Attributes:
-        settings: masses, damping, and how the mesh force is made; not the speeds.
-        mesh: prepared at the positions of the mesh force.
+        settings: masses, damping and settings of the mesh force; the speeds are not used.
+        mesh: mesh prepared at the positions of the mesh force.
         coast: modifications of the coast flanks of (pinion, wheel), which do not wear.
-        deviation: material that manufacturing deviations remove from the drive flanks at these positions [um]; None
-            for nominal gears.
-        steps: of the integrator per mesh cycle.
+        deviation: material removed from the drive flanks by manufacturing deviations at the positions of `mesh` [um];
+            None for nominal gears.
+        steps: steps of the integrator per mesh cycle.
         wears: True if the flanks wear under the forces of the motion.
     """
 
@@ -41,7 +41,7 @@ class Vibration(eqx.Module):
     wears: bool = eqx.field(static=True)
 
     def force(self, flanks: Flanks, load: OperatingPoint, phase: Float[Array, " positions"]) -> SteadyForce:
-        """Force of the steady motion from rest, at mesh positions [base pitches]."""
+        """Mesh force of the steady motion that starts at rest [N], at mesh positions [base pitches]."""
         assert load.speed is not None  # `vibration_of` has asked for it
         more: dict[str, Any] = {"coast": self.coast, "deviation": self.deviation}
         oscillator, _ = self.settings.oscillator_and_mesh(self.mesh, load.torque, **flanks, **more)
@@ -57,21 +57,21 @@ def vibration_of(
     flanks: Flanks,
     deviation: Deviation | None,
 ) -> Vibration | None:
-    """The vibrating system; None without dynamics.
+    """Vibrating system of a wear analysis; None without dynamics.
 
-    Where nothing is traced the mesh has as many pairs and the integrator as many steps as the new flanks need.
+    With concrete numbers the numbers of pairs of the mesh and of steps of the integrator follow from the new flanks.
 
     Args:
         mesh: prepared mesh.
-        loads: with a leading axis (torques,).
+        loads: operating points with a leading axis (torques,).
         settings, line_load: as for `wear`.
         flanks: modifications of the new flanks.
-        deviation: material that manufacturing deviations remove besides [um].
+        deviation: material removed by manufacturing deviations [um], in addition to the modifications.
 
     Raises:
-        TypeError: for something else than `Dynamics`.
-        ValueError: for a dynamic load without dynamics, another word, loads without speed, at rest or of nothing, and
-            as `mesh_force`.
+        TypeError: if settings are not `Dynamics`.
+        ValueError: for a dynamic load without dynamics, an unknown `line_load`, loads without a speed, with zero speed
+            or with zero torque, and for all errors of `mesh_force`.
     """
     check_line_load(line_load, settings)
     if settings is None:
@@ -98,11 +98,11 @@ def vibration_of(
 
 
 def check_line_load(line_load: object, dynamics: object) -> None:
-    """Checks under which load flanks are to wear.
+    """Check `line_load` and `dynamics` of a wear analysis.
 
     Raises:
-        TypeError: for dynamics that are something else.
-        ValueError: for another word, and for a dynamic load without dynamics.
+        TypeError: if dynamics are not `Dynamics`.
+        ValueError: for an unknown `line_load`, and for a dynamic load without dynamics.
     """
     if line_load not in (None, *get_args(LineLoad)):
         raise ValueError(f'line_load = {line_load!r} must be "static" or "dynamic"')

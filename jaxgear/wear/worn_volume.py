@@ -1,20 +1,20 @@
-"""From the contacts of a mesh to the flanks, by Archard's law: where every loaded position wears both gears.
+"""Conservative mapping of the worn volume from the contacts of a mesh to grids on both flanks, by Archard's law.
 
-A position stands for the piece of the path of contact from half a step before it to half a step after it. On that piece
-the flanks slide past each other by
+A position represents the interval of the path of contact from half a step before it to half a step after it. In this
+interval the sliding distance of the flanks is
 
     S = integral of |rho_1 / r_b1 - rho_2 / r_b2| d path,
 
-rho the roll lengths, and in corner contact by the arc of the mate's flank that the tip corner travels. What is worn off
-goes to the points of a grid on each flank by their hat functions, at places all over that piece and across the contact,
-with the weight of the Hertzian pressure, as the contact in turn meets the flank. Every piece of worn material lands on
-the flank, so that the volume of the depth is the worn volume to rounding, and equal pieces of sliding leave no ripple
-of the positions.
+rho the roll lengths; in corner contact it is the arc of the mate's flank that the tip corner travels. The worn material
+is distributed to the grid points of each flank by their hat functions, at sampling points along the interval and across
+the contact width, weighted by the Hertzian pressure. All worn material is mapped to the flank: the volume of the depth
+equals the worn volume to rounding, and equal sliding distances leave no ripple with the spacing of the positions.
 
-A contact is as wide as its own load makes it, up to the full load of one pair. It wears both flanks where it is: down
-the slope of a relief it shifts along them, by the same arc on either gear (`RemovedMaterial.shift`), between positions
-linearly. To first order the flanks slide past each other there as they do at the nominal contact. What would lie beyond
-an end of the flank is folded back, so that an even load wears evenly up to the end.
+The contact width follows from the load of each contact, up to the full load of one pair. A contact wears both flanks at
+its actual place: on the slope of a relief it shifts by the same arc along either flank (`RemovedMaterial.shift`),
+linear
+between positions. To first order the sliding there equals the sliding at the nominal contact. Material that would lie
+beyond an end of the flank is folded back, so that an even load wears evenly up to the end.
 
 While one pair of teeth passes through the mesh, every point of flank i is in contact over the distance 2 a of the
 rolling, slides past its mate by 2 a |u1 - u2| / u_i, and wears by
@@ -23,9 +23,9 @@ rolling, slides past its mate by 2 a |u1 - u2| / u_i, and wears by
 
 p the mean pressure, q the line load, u the rolling speeds of the flanks: the half width of the contact drops out.
 
-Flanks of helical gears slide in the transverse section, along their profiles and across the contact line, every slice
-of the face at its own phase. The line load per face width is the normal force per length of the contact line, so that
-dh_i is normal to the flank; depths here are those in the transverse section, as modifications are: dh_i / cos(beta_b).
+Flanks of helical gears slide in the transverse section, along their profiles, every slice of the face at its own phase.
+The line load per face width is the normal force per length of the contact line, so that dh_i is normal to the flank.
+Depths here are measured in the transverse section, like modifications: dh_i / cos(beta_b).
 
 References:
     J. F. Archard, J. Appl. Phys. 24 (1953) 981-988, doi 10.1063/1.1721448.
@@ -59,28 +59,32 @@ _MIDDLES, _ENDS = (np.arange(_PLACES) + 0.5) / _PLACES - 0.5, np.arange(_PLACES 
 PARTS = "flank", "corner"
 
 
-_TOWARDS_PINION_TIP = np.array([1.0, -1.0])  # which way along the flanks of pinion and wheel the roll lengths grow
+_TOWARDS_PINION_TIP = np.array([1.0, -1.0])  # sign of the growth of roll length on pinion and wheel
 
 Contact = Float[Array, "pairs #slices positions"]
 
 
 class Deposit(eqx.Module):
-    """Where contacts wear the flanks of pinion and wheel, in this order along the axis gears.
+    """Mapping of worn volume from contacts to the grids on the flanks; the axis `gears` is (pinion, wheel).
 
     Attributes:
-        roll_length: of the grid points, from the start of the active profile to the tip [mm], shape (gears, points).
-        arc: of the flank that belongs to every point [mm], shape (gears, points).
-        base_radius: [mm], shape (gears,).
-        nominal: arc of the flanks from the base circle to the nominal contact [mm], at the places along the piece of
-            every position, shape (gears, pairs, 1, positions, places), of helical gears with slices.
-        sliding: along those places, on the flank and of tip corners [mm], shape (parts, pairs, 1 or slices, positions,
-            places).
-        half_width: of contacts under the full load [mm], shape (pairs, 1 or slices, positions), as what follows.
-        beyond: of the virtual centre of the contact beyond the corner that touches [mm]; zero on the path.
-        lowest, highest: how far contacts may move from their nominal places towards the pinion tip [mm].
-        full_load: line load of one pair that carries all [N/mm].
-        inclination: cos(beta_b), depth normal to the flank over that in the transverse section.
-        nodes: places across the contact.
+        roll_length: roll lengths of the grid points, from the start of the active profile to the tip [mm], shape
+            (gears, points).
+        arc: arc length of the flank that belongs to every grid point [mm], shape (gears, points).
+        base_radius: base radii [mm], shape (gears,).
+        nominal: arc length of the flanks from the base circle to the nominal contact [mm], at the sampling points in
+            the interval of every position, shape (gears, pairs, 1, positions, places); slices in place of 1 for helical
+            gears.
+        sliding: sliding distance at the sampling points, on the flank and of tip corners [mm], shape (parts, pairs, 1
+            or slices, positions, places).
+        half_width: half width of contacts under the full load [mm], shape (pairs, 1 or slices, positions).
+        beyond: distance of the virtual centre of the contact beyond the tip corner that touches [mm], shape as
+            `half_width`; zero on the path of contact.
+        lowest, highest: limits of the shift of contacts from their nominal places, positive towards the pinion tip
+            [mm], shapes as `half_width`.
+        full_load: line load of one pair that carries the full load [N/mm].
+        inclination: cos(beta_b), ratio of the depth normal to the flank to the depth in the transverse section.
+        nodes: number of sampling points across the contact width.
     """
 
     roll_length: Float[Array, "gears points"]
@@ -97,13 +101,13 @@ class Deposit(eqx.Module):
     nodes: int = eqx.field(static=True)
 
     def arcs(self, line_load: Load, shift: Contact) -> Float[Array, "gears pairs slices positions places nodes"]:
-        """Where contacts under line loads [N/mm] that have shifted [mm] leave their wear: arcs from the base circle."""
+        """Arcs from the base circle to the worn places [mm], for contacts with line loads [N/mm] and shifts [mm]."""
         moved = _along_pieces(jnp.clip(self.beyond + shift, self.lowest, self.highest))
         centre = self.nominal + _first(jnp.asarray(_TOWARDS_PINION_TIP, moved.dtype), 5) * moved[None]
         share = safe_sqrt(jnp.minimum(safe_divide(line_load, self.full_load), 1.0))
         across = _last([node.place for node in contact_nodes(self.nodes)], 5, moved.dtype)
         arc = centre[..., None] + ((self.half_width * share)[..., None, None] * across)[None]
-        # the contact ends with the flank: the share that would lie beyond wears what is left of it
+        # the part of the contact width that would lie beyond the end of the flank is folded back
         first, last = (_first(_arc(self.roll_length[:, end], self.base_radius), arc.ndim) for end in (0, -1))
         return jnp.clip(
             jnp.where(arc < first, 2 * first - arc, jnp.where(arc > last, 2 * last - arc, arc)), first, last
@@ -111,12 +115,12 @@ class Deposit(eqx.Module):
 
 
 def grid(mesh: Mesh, points: int) -> Float[Array, "gears points"]:
-    """Roll lengths evenly spaced from the start of the active profile to the tip [mm]: pinion, wheel."""
+    """Evenly spaced roll lengths from the start of the active profile to the tip [mm], shape (gears, points)."""
     return jnp.stack([jnp.linspace(side.start_roll_length, side.tip_roll_length, points) for side in mesh.sides])
 
 
 def arcs(roll_length: Float[Array, " points"], base_radius: Scalar) -> Float[Array, " points"]:
-    """Arc of an involute that belongs to every point [mm]: the integral of its hat function rho / r_b d rho."""
+    """Arc of an involute that belongs to every grid point [mm]: integral of its hat function times rho / r_b d rho."""
     width = jnp.diff(roll_length)
     to_left = width * (roll_length[:-1] + 2 * roll_length[1:]) / 6
     to_right = width * (2 * roll_length[:-1] + roll_length[1:]) / 6
@@ -126,7 +130,7 @@ def arcs(roll_length: Float[Array, " points"], base_radius: Scalar) -> Float[Arr
 
 @program
 def deposit(mesh: Mesh, torque: Scalar, points: int) -> Deposit:
-    """The deposit of a mesh under a torque on the pinion [N m], which tells how wide its contacts are."""
+    """Mapping of worn volume for a mesh under a torque on the pinion [N m], which sets the contact widths."""
     contact, path, dtype = mesh.path_of_contact, over_slices(mesh.kinematics.contact_path), mesh.slice_width.dtype
     step = contact.base_pitch / mesh.resolution.positions
 
@@ -154,21 +158,21 @@ def deposit(mesh: Mesh, torque: Scalar, points: int) -> Deposit:
 
 
 def _first(values: Array, ndim: int) -> Array:
-    """Values along the first one of many axes."""
+    """Values along the first of `ndim` axes."""
     return values.reshape(-1, *[1] * (ndim - 1))
 
 
 def _last(values: Sequence[float] | np.ndarray, ndim: int, dtype: np.dtype) -> Array:
-    """Values along the last one of many axes."""
+    """Values along the last of `ndim` axes."""
     return jnp.asarray(values, dtype).reshape(*[1] * (ndim - 1), -1)
 
 
 def _along_pieces(field: Contact) -> Float[Array, "pairs #slices positions places"]:
-    """A field of the contacts at the places along their pieces, linear from position to position."""
+    """Field of the contacts, interpolated linearly between positions, at the sampling points of every interval."""
     pairs, slices, positions = field.shape
-    # along the path: the last pair is the first there
+    # in the order of the path of contact: the last pair comes first
     line = jnp.swapaxes(field[::-1], 0, 1).reshape(slices, -1)
-    step = jnp.diff(line, prepend=line[:, :1], append=line[:, -1:])  # to every contact, and beyond the last one none
+    step = jnp.diff(line, prepend=line[:, :1], append=line[:, -1:])  # step to every contact; zero beyond the last one
     before, after = step[:, :-1, None], step[:, 1:, None]
     places = _last(_MIDDLES, 3, field.dtype)
     found = line[..., None] + jnp.where(places < 0, before, after) * places
@@ -178,7 +182,7 @@ def _along_pieces(field: Contact) -> Float[Array, "pairs #slices positions place
 def _sliding(
     mesh: Mesh, ends: Float[Array, "pairs #slices positions ends"]
 ) -> Float[Array, "parts pairs #slices positions places"]:
-    """Sliding between neighbouring ends [mm], on the flank and of tip corners."""
+    """Sliding distance between neighbouring path positions [mm], on the flank and of tip corners."""
     contact = mesh.path_of_contact
     on_path = jnp.clip(ends, contact.start, contact.end)
     # on the path rho_1 / r_b1 - rho_2 / r_b2 is s (1 / r_b1 + 1 / r_b2), at the distance s from the pitch point
@@ -199,14 +203,14 @@ def _arc(roll_length: Float[Array, "..."], base_radius: Float[Array, "..."]) -> 
     return roll_length**2 / (2 * base_radius)
 
 
-# A coefficient of 1 m2/N makes 1e6 mm2/N, and these times N/mm are 1e3 um each.
+# wear depth [um] = 1e9 x coefficient [m2/N] x line load [N/mm]: 1e6 mm2/m2 times 1e3 um/mm
 UM_PER_LOAD = 1e9
 
 
 def specific_sliding(contact: PathOfContact, path: Given) -> tuple[Float[Array, "..."], Float[Array, "..."]]:
-    """Sliding over rolling |u1 - u2| / u_i of pinion and wheel at a path position [mm], of its shape.
+    """Specific sliding |u1 - u2| / u_i of pinion and wheel at path positions [mm], two arrays of the shape of `path`.
 
-    Beyond the path of contact it is that at its end: there a tip corner slides over the mate's flank.
+    Beyond the path of contact, where a tip corner slides over the mate's flank, it is the value at the end of the path.
     """
     path = jnp.clip(path, contact.start, contact.end)
     sliding = jnp.abs(path) * (1 / contact.pinion_base_radius + 1 / contact.wheel_base_radius)
@@ -216,13 +220,13 @@ def specific_sliding(contact: PathOfContact, path: Given) -> tuple[Float[Array, 
 
 
 def passage_depth(cycle: MeshCycle, coefficient: Numbers) -> tuple[Load, Load]:
-    """Wear depth that one passage of a pair leaves where every contact of a cycle is, on pinion and wheel [um].
+    """Wear depth of one passage of a tooth pair at every contact of a mesh cycle, on pinion and wheel [um].
 
-    In the transverse section, as that of a modification.
+    Depths are measured in the transverse section, like modifications.
 
     Args:
         cycle: solved mesh cycle, without batch axes.
-        coefficient: of wear [m2/N], a number, or one for every contact, shape (pairs, slices, positions).
+        coefficient: wear coefficient [m2/N], shape (), or (pairs, slices, positions) for one value per contact.
 
     Returns:
         k_w q |u1 - u2| / (u_i cos(beta_b)) of both gears, shape (pairs, slices, positions) each.
@@ -242,21 +246,24 @@ def passage_depth(cycle: MeshCycle, coefficient: Numbers) -> tuple[Load, Load]:
 def worn(
     line_load: Load, shift: Contact, coefficient: Given, place: Deposit
 ) -> Float[Array, "gears parts slices points"]:
-    """Wear depth that one passage leaves on the grids of both flanks [um], on the flank and by tip corners.
+    """Wear depth of one passage of a tooth pair on the grids of both flanks [um], by flank contact and by tip corners.
 
-    In the transverse section, as that of a modification.
+    Depths are measured in the transverse section, like modifications.
 
     Args:
-        line_load: [N/mm], shape (pairs, slices, positions).
-        shift: of the contacts, see `RemovedMaterial` [mm], shape (pairs, slices or 1, positions).
-        coefficient: of wear [m2/N]; of every gear and contact, to be broadcast to (gears, pairs, slices, positions).
-        place: where contacts wear the flanks.
+        line_load: line load [N/mm], shape (pairs, slices, positions).
+        shift: contact shift, see `RemovedMaterial` [mm], shape (pairs, slices or 1, positions).
+        coefficient: wear coefficient [m2/N], broadcast to (gears, pairs, slices, positions).
+        place: mapping of worn volume to the grids.
+
+    Returns:
+        wear depth [um], shape (gears, parts, slices, points).
     """
     gears, slices, points = len(place.base_radius), line_load.shape[1], place.roll_length.shape[-1]
     taken = jnp.broadcast_to(UM_PER_LOAD * coefficient * line_load[None] / place.inclination, (gears, *line_load.shape))
     mean = _last([node.mean for node in contact_nodes(place.nodes)], 7, line_load.dtype)
     left = (taken[None, ..., None] * place.sliding[:, None])[..., None] * mean
-    # between which points of the grid, and how far from the first of them
+    # grid interval of every sampling point, and the place within it
     base, knots, next_knots = (_first(of, 6) for of in (place.base_radius, *place.roll_length.T[:2]))
     step = next_knots - knots
     at = jnp.clip((safe_sqrt(2 * base * place.arcs(line_load, shift)) - knots) / step, 0.0, points - 1)
@@ -265,7 +272,7 @@ def worn(
     gear = _first(jnp.arange(gears, dtype=jnp.int32), 6)
     face = jnp.arange(slices, dtype=jnp.int32).reshape(1, 1, -1, 1, 1, 1)
     left = jnp.moveaxis(left, 0, -1)
-    # to both ends of a cell at once, since every entry of a scatter costs alike
+    # one scatter to both ends of a grid interval: every entry of a scatter costs the same
     ends = jnp.concatenate([left * (1 - ahead)[..., None], left * ahead[..., None]], axis=-1)
     cells = jnp.zeros((gears, slices, points - 1, 2 * len(PARTS)), line_load.dtype).at[gear, face, cell].add(ends)
     first, second = jnp.split(jnp.pad(cells, ((0, 0), (0, 0), (1, 1), (0, 0))), 2, axis=-1)
