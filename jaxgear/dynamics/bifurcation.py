@@ -1,4 +1,4 @@
-"""Where branches of periodic orbits turn or lose stability: the kinds of these points, and where they lie."""
+"""Bifurcations of periodic orbits, where branches turn or lose stability: kinds and location."""
 
 from collections.abc import Callable
 from typing import Literal, NamedTuple
@@ -41,10 +41,10 @@ class Bifurcation(Checked):
     Attributes:
         kind: "fold" where the branch turns (multiplier +1), "flip" where the period doubles (-1), "Neimark-Sacker"
             where a pair of complex multipliers crosses the circle.
-        parameter: of the family, for an oscillator the mesh frequency [Hz].
-        orbit: there.
-        direction: of the deviation that neither grows nor decays, in the unknowns of `Orbit.monodromy`, of length one;
-            for a complex pair its real part.
+        parameter: parameter of the family; the mesh frequency [Hz] for an oscillator.
+        orbit: orbit at the bifurcation.
+        direction: unit vector of the critical deviation, which neither grows nor decays, in the unknowns of
+            `Orbit.monodromy`; its real part for a complex pair.
     """
 
     kind: Kind
@@ -54,12 +54,12 @@ class Bifurcation(Checked):
 
 
 class Tests(NamedTuple):
-    """Numbers of a point of a branch that tell bifurcations.
+    """Test functions of a point of a branch, whose changes indicate bifurcations.
 
     Attributes:
-        level: part of the tangent along the parameter, zero at a fold; NaN where the parameter stands still.
+        level: component of the tangent along the parameter, zero at a fold; NaN if the parameter is constant.
         doubling: zero at a flip.
-        moduli: of the multipliers, the largest first.
+        moduli: moduli of the multipliers in descending order.
     """
 
     level: float
@@ -67,10 +67,10 @@ class Tests(NamedTuple):
     moduli: np.ndarray
 
     def crossed(self, other: "Tests") -> dict[Kind, Callable[["Tests"], float]]:
-        """The kinds of bifurcation between two points, and the number that is zero there.
+        """Kinds of bifurcation between two points, each with the test function that is zero at it.
 
-        At a fold and at a flip one multiplier crosses the unit circle. Where two more have done so they are a pair:
-        the moduli in order change continuously, whatever becomes of the pairs elsewhere.
+        One multiplier crosses the unit circle at a fold and at a flip. Two further crossings are a complex pair: the
+        sorted moduli change continuously, even where pairs form or separate.
         """
         found: dict[Kind, Callable[[Tests], float]] = {}
         if self.level * other.level < 0:
@@ -96,7 +96,7 @@ def tests_of(point: Corrected) -> Tests:
 
 
 def bifurcation_at(kind: Kind, parameter: Scalar, point: Corrected, orbit: Orbit) -> Bifurcation | None:
-    """A located bifurcation with the direction of its deviation; None where the multipliers are not of its kind."""
+    """Bifurcation at a located point, with its critical direction; None if the multipliers do not match the kind."""
     if kind == "fold":  # along the branch itself, where coordinates that turn freely have multipliers of one too
         direction = np.asarray(point.tangent[:-1])
     else:
@@ -111,7 +111,7 @@ def bifurcation_at(kind: Kind, parameter: Scalar, point: Corrected, orbit: Orbit
 
 
 def critical(kind: Kind, multipliers: np.ndarray) -> complex:
-    """The multiplier of a bifurcation: +1, -1, or that of the pair nearest to the unit circle, above the real axis."""
+    """Critical multiplier: +1, -1, or of the complex pair nearest to the unit circle the one above the real axis."""
     if kind != "Neimark-Sacker":
         return 1.0 if kind == "fold" else -1.0
     apart = np.where(multipliers.imag > _REAL, np.abs(np.abs(multipliers) - 1), np.inf)
@@ -132,12 +132,13 @@ class BifurcationPoint(WithStatus, Checked):
     """Result of `bifurcation_of`.
 
     Attributes:
-        parameter: at which it lies; for an oscillator the mesh frequency [Hz]; differentiable.
-        displacement, velocity: start of the orbit there [um], [um/s], without derivatives, shape (coordinates,).
-        test: the number that is zero there. For a fold the slope of the parameter over the branch, both scaled: not
-            zero where the branch has a corner. For a flip the product of 1 + multiplier, for a Neimark-Sacker point
-            the modulus of the pair less one.
-        status: `converged` where a bifurcation was found.
+        parameter: parameter at the bifurcation, differentiable; the mesh frequency [Hz] for an oscillator.
+        displacement, velocity: start of the orbit at the bifurcation [um], [um/s], without derivatives, shape
+            (coordinates,).
+        test: value of the test function, which is zero at the bifurcation. For a fold it is the scaled slope of the
+            parameter over the branch, not zero at a corner of the branch; for a flip the product of 1 + multiplier; for
+            a Neimark-Sacker point the modulus of the pair minus 1.
+        status: `converged` if a bifurcation was found.
     """
 
     parameter: Scalar = result()
@@ -148,9 +149,9 @@ class BifurcationPoint(WithStatus, Checked):
 
 
 def bifurcation_of(oscillator: Oscillator | Family, near: Bifurcation, *, steps: Numbers = STEPS) -> BifurcationPoint:
-    """The bifurcation of the same kind next to one that was found, as a function of every number of the oscillator.
+    """Locate the bifurcation of the same kind next to a known one, differentiable by every number of the oscillator.
 
-    The branch is followed to where a number is zero: the slope of the parameter at a fold, the distance of a
+    The branch is followed to a zero of the test function: the slope of the parameter at a fold, the distance of a
     multiplier from -1 at a flip, of a pair from the unit circle at a Neimark-Sacker point. With the equations
     E(y, parameter, p) of the bifurcation, which are the change of the unknowns y over the orbit and, but at a fold,
     the modulus of the critical multiplier, and the left null vector w of their derivative, w dE/dy = 0 (at a fold the
@@ -163,10 +164,10 @@ def bifurcation_of(oscillator: Oscillator | Family, near: Bifurcation, *, steps:
     does not have. Derivatives of first order are exact; those of higher order are not.
 
     Args:
-        oscillator: that moves, or a function of a parameter that gives an oscillator and a mesh frequency [Hz]; for
-            derivatives a function that is an `equinox.Module` and holds what they are taken by.
-        near: a bifurcation of the same or a similar oscillator, from `Branch.bifurcations`.
-        steps: of a mesh cycle, as for `find_orbit`.
+        oscillator: oscillator, or a function of a parameter that returns an oscillator and a mesh frequency [Hz]; for
+            derivatives an `equinox.Module` whose fields are the numbers to differentiate by.
+        near: bifurcation of the same or a similar oscillator, from `Branch.bifurcations`.
+        steps: steps of a mesh cycle, as for `find_orbit`.
 
     Raises:
         TypeError: for something else than an oscillator or a function, or than a bifurcation.
@@ -219,7 +220,7 @@ def _moved(family: Family, given, nodes, kind: Kind, periods: int) -> Bifurcatio
 
 
 def _critical(kind: Kind, monodromy, near):
-    """The critical multiplier of an orbit, that next to a known one."""
+    """Critical multiplier of an orbit, the nearest one to a known multiplier."""
     if kind != "Neimark-Sacker":
         return near
     multipliers = jnp.linalg.eigvals(monodromy)
@@ -241,18 +242,17 @@ def _growing(monodromy, multiplier):
 
 
 def _without(unknowns, along):
-    """The combination of equations in which the unknowns do not appear but the parameter does."""
+    """Combination of the equations that depends on the parameter but not on the unknowns."""
     left, sizes, _ = jnp.linalg.svd(unknowns)
     sizes = jnp.zeros(len(along), along.dtype).at[: len(sizes)].set(sizes)
-    # squared, so that no other direction has a say; coordinates that turn freely have null vectors of their own, in
-    # which the parameter does not appear
+    # squared, to suppress other directions; freely rotating coordinates add null vectors without the parameter
     rounding = 10 * jnp.finfo(along.dtype).eps ** 0.5 * jnp.max(sizes)
     combined = left @ ((along @ left) / (sizes**2 + rounding**2))
     return combined / jnp.linalg.norm(combined)
 
 
 class _Search(NamedTuple):
-    """Two places on the branch, the distance to try next, and how far the search is."""
+    """State of the search: two places on the branch, next trial distance, and number of trials."""
 
     point: Corrected
     distances: Scalar
@@ -263,15 +263,15 @@ class _Search(NamedTuple):
 
     @property
     def enclosed(self) -> Bool[Array, ""]:
-        """Whether a test of zero has been met or enclosed; at the corner of a branch it can only be enclosed."""
+        """True if the zero of the test function has been met or enclosed; at a corner it can only be enclosed."""
         apart = jnp.abs(self.distances[1] - self.distances[0])
         return (self.trials > 1) & ((jnp.abs(self.tests[1]) < _FLAT) | (self.bracketed & (apart < _NARROW)))
 
 
 def _searched(family: Family, kind: Kind, begin: Place, normal: Place, multiplier, scales, nodes, periods) -> _Search:
-    """Search for the zero of the test of a kind along a normal: false position (Illinois).
+    """Search the zero of the test function of a kind along a normal, by false position (Illinois).
 
-    Until the test has changed its sign, secants extended by a factor.
+    Extended secants are used until the test function has changed its sign.
     """
 
     def at(distance):
@@ -305,7 +305,7 @@ def _searched(family: Family, kind: Kind, begin: Place, normal: Place, multiplie
 
 
 def _next(distances, tests, bracketed, trials) -> Scalar:
-    """The distance to try after two tests."""
+    """Next trial distance from two values of the test function."""
     rise = tests[1] - tests[0]
     secant = -tests[1] * (distances[1] - distances[0]) / jnp.where(rise == 0, 1.0, rise)
     ahead = jnp.where(bracketed, secant, jnp.clip(_FURTHER * secant, -_FARTHEST, _FARTHEST))

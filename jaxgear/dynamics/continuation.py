@@ -43,13 +43,13 @@ class Branch(Checked):
     """Periodic orbits along a branch, stable and unstable, in the order in which it was followed.
 
     Attributes:
-        parameter: of the family, for an oscillator the mesh frequency [Hz], shape (points,).
-        orbits: every array with the leading axis (points,).
-        bifurcations: in order; `before` tells where they lie.
-        before: index of the first point behind every bifurcation.
-        ended: "range" where the parameter reached an end of its range, "points" after the largest number of them,
-            "closed" where the branch came back to its begin, "joined" where it ended on the branch of orbits of half
-            the period, "lost" where Newton's method did not go on.
+        parameter: parameter of the family, shape (points,); the mesh frequency [Hz] for an oscillator.
+        orbits: orbits, every array with the leading axis (points,).
+        bifurcations: bifurcations in the order of the branch; `before` gives their places.
+        before: index of the first point after every bifurcation.
+        ended: reason for the end of the branch: "range" (the parameter reached an end of its range), "points" (largest
+            number of points), "closed" (the branch returned to its start), "joined" (it reached the branch of orbits of
+            half the period), "lost" (Newton's method failed).
     """
 
     parameter: Float[Array, " points"] = result()
@@ -60,7 +60,7 @@ class Branch(Checked):
 
     @property
     def mesh_frequency(self) -> Float[Array, " points"]:
-        """[Hz]."""
+        """Mesh frequency of every orbit [Hz]."""
         return self.orbits.mesh_frequency
 
     @property
@@ -70,7 +70,7 @@ class Branch(Checked):
 
     @property
     def stable(self) -> Bool[Array, " points"]:
-        """Whether every orbit is stable."""
+        """True for every stable orbit."""
         return self.orbits.stable
 
 
@@ -86,27 +86,29 @@ def follow_orbits(
     steps: Numbers = STEPS,
     callback: Callable[[int, Orbit], None] | None = None,
 ) -> Branch:
-    """Follows a branch of periodic orbits through its folds until the parameter leaves a range.
+    """Follow a branch of periodic orbits through its folds until the parameter leaves a range.
 
     Pseudo-arclength continuation: a step along the tangent, then Newton's method across it. Steps grow and shrink with
     the work of Newton's method. Between points at which a multiplier has crossed the unit circle the bifurcation is
     located. The loop runs on the host; its points share one compiled function.
 
     Args:
-        oscillator: that moves, over its mesh frequency; or a function of a parameter that gives an oscillator and a
-            mesh frequency [Hz].
-        start: an orbit of the branch; or a flip of another branch, from which orbits of twice the period branch off.
+        oscillator: oscillator, followed over its mesh frequency; or a function of a parameter that returns an
+            oscillator and a mesh frequency [Hz].
+        start: orbit on the branch; or a flip of another branch, from which orbits of twice the period branch off.
         within: smallest and largest parameter.
-        direction: of the parameter at the start; a branch from a flip goes where it must.
-        parameter: of the start, where a function and an orbit are given; the mesh frequency of the orbit without it.
-        step: first step along the branch, as part of the parameter and of the size of the orbit.
+        direction: direction of the parameter at the start; ignored for a start at a flip.
+        parameter: parameter at the start, if a function and an orbit are given; None for the mesh frequency of the
+            orbit.
+        step: first step along the branch, relative to the parameter and to the size of the orbit.
         points: largest number of points.
-        steps: of a mesh cycle, as for `find_orbit`.
+        steps: steps of a mesh cycle, as for `find_orbit`.
         callback: called with the number of every point and its orbit.
 
     Raises:
-        TypeError: for something else than an oscillator, a function or a start.
-        ValueError: for a start that is no flip or lies outside of the range, or a number out of its range.
+        TypeError: if an argument is not an oscillator, a function or a start.
+        ValueError: for a bifurcation other than a flip as start, a start outside the range, or a number out of its
+            range.
     """
     if direction not in ("up", "down"):
         raise ValueError(f'direction = {direction!r} must be "up" or "down"')
@@ -148,7 +150,7 @@ class _Follower:
         return _point(self.family, guess, normal, self.scales, self.nodes, self.periods)
 
     def along(self, distance) -> tuple[Corrected, Orbit]:
-        """The point a distance ahead along the tangent."""
+        """Corrected point at a distance along the tangent."""
         return self.at(self.point.place + distance * self.point.tangent, self.point.tangent)
 
     def followed(self, step: float, points: int, callback) -> Branch:
@@ -195,7 +197,7 @@ class _Follower:
         self.parameters.append(self.scales.unknowns(point.place)[1])
 
     def take_last(self, beyond: Corrected) -> None:
-        """The point at the end of the range."""
+        """Add the point at the end of the range."""
         end = self.low if self.parameter(beyond) < self.low else self.high
         here, there = float(self.point.place[-1]), float(beyond.place[-1])
         target = end / float(self.scales.parameter)
@@ -211,7 +213,7 @@ class _Follower:
         return apart < step and float(jnp.sum(point.tangent * self.begin.tangent)) > 0
 
     def note(self, point: Corrected, orbit: Orbit, step: float) -> None:
-        """Locates the bifurcations up to the next point."""
+        """Locate the bifurcations up to the next point."""
         tests = tests_of(point)
         found = [self.located(kind, test, tests, step) for kind, test in self.tests.crossed(tests).items()]
         for _, bifurcation in sorted(found, key=lambda item: item[0]):
@@ -266,12 +268,12 @@ def _point(family, guess, normal, scales: Scales, nodes, periods: int) -> tuple[
 
 
 def _joins(here: Orbit, there: Orbit) -> bool:
-    """Whether orbits of half the period lie between two neighbouring orbits: their halves have changed places."""
+    """True if an orbit of half the period lies between two neighbouring orbits: their halves are exchanged."""
     return here.periods % 2 == 0 and float(np.dot(_odd(here), _odd(there))) < 0
 
 
 def _odd(orbit: Orbit) -> np.ndarray:
-    """DTE and scaled DTE rate [um] at the start of an orbit, less their values half an orbit later."""
+    """DTE and scaled DTE rate at the start of an orbit, minus their values half an orbit later [um]."""
     scale = 2 * np.pi * float(orbit.mesh_frequency)
     halves = (np.split(np.asarray(part), 2) for part in (orbit.dte, orbit.dte_rate / scale))
     return np.array([first[0] - second[0] for first, second in halves])

@@ -1,4 +1,4 @@
-"""Drive and coast flanks of a mesh: one gear pair seen twice, and the clearance between both."""
+"""Drive and coast flanks of a mesh: two contact problems of one gear pair, and the backlash between them."""
 
 from dataclasses import replace
 from typing import Any, NamedTuple
@@ -18,13 +18,14 @@ Both = tuple[AbstractModification | None, AbstractModification | None]
 
 
 class Flanks(NamedTuple):
-    """One side of the teeth as the mesh force meets it.
+    """Drive or coast flanks of a mesh.
 
     Attributes:
-        mesh: prepared at the mesh positions of these flanks.
-        removed: material removed.
-        order: which of its positions belongs to each position of the drive flanks, shape (positions,).
-        clearance: what is added to the DTE of these flanks where the other ones just touch unmodified [um].
+        mesh: mesh prepared at the mesh positions of these flanks.
+        removed: material removed from these flanks.
+        order: index of the position of `mesh` for each position of the drive flanks, shape (positions,).
+        clearance: DTE from the contact of the unmodified drive flanks to the contact of these flanks [um]; 0 for the
+            drive flanks.
     """
 
     mesh: Mesh
@@ -39,8 +40,8 @@ class Static(NamedTuple):
     Attributes:
         unloaded: DTE at which the flanks touch [um].
         loaded: DTE under the torque, series compliance included [um].
-        stiffness: slope of the force there [N/um].
-        status: of the contact.
+        stiffness: tangent stiffness under the torque [N/um].
+        status: status of the contact.
     """
 
     unloaded: Curve
@@ -50,7 +51,7 @@ class Static(NamedTuple):
 
 
 def drive_flanks(mesh: Mesh, torque: Scalar, modification: Both) -> Flanks:
-    """The flanks that a mesh has been prepared for."""
+    """Drive flanks of a prepared mesh with modifications (pinion, wheel)."""
     mesh = replace(mesh, automatic=False)  # as that of the coast flanks, which then need no programs of their own
     pinion, wheel = modification
     removed = removed_material(mesh, torque, pinion=pinion, wheel=wheel)
@@ -58,28 +59,28 @@ def drive_flanks(mesh: Mesh, torque: Scalar, modification: Both) -> Flanks:
 
 
 def coast_flanks(mesh: Mesh, torque: Scalar, modification: Both) -> Flanks:
-    """The flanks behind, solved at their own mesh positions.
+    """Coast flanks of a mesh with modifications (pinion, wheel), solved at their own mesh positions.
 
-    Seen in a mirror the coast flanks are drive flanks of the same gears that turn the other way, and their force is
+    In a mirror image the coast flanks are drive flanks of the same gears with reversed rotation. Their force is
 
         F(phase, q) = -F_coast(phase_c - phase, -q - j),    phase_c = 1/2 + (s_1 - s_2) / (2 p)
 
     with the backlash j on the line of action, the tooth thicknesses s_1 of the pinion and s_2 of the wheel on the
     working pitch circles, and the pitch p = s_1 + s_2 + j / cos(alpha_w) there.
 
-    Of a DTE q both gears have half: the pinion is q/2 ahead of its mean position, the wheel q/2 behind, as
-    everywhere in jaxgear. On the pitch circle the leading flank of the pinion's reference tooth is then
-    phase p + q / (2 cos(alpha_w)) ahead of the pitch point and the coast flank s_1 behind that. The coast flanks touch
-    where q = -j: they do so in the pitch point at phase p = s_1 + j / (2 cos(alpha_w)), modulo p, which is phase_c.
+    Each gear takes half of a DTE q: the pinion is q/2 ahead of its mean position, the wheel q/2 behind, as everywhere
+    in jaxgear. On the pitch circle the leading flank of the reference tooth of the pinion is then
+    phase p + q / (2 cos(alpha_w)) ahead of the pitch point, and the coast flank is s_1 behind that flank. The coast
+    flanks touch at q = -j, in the pitch point at phase p = s_1 + j / (2 cos(alpha_w)), modulo p, which is phase_c.
     The coast contact moves against the mirrored direction while the gears turn on, hence the sign of the phase; its
     DTE is measured from q = -j, and half of it again moves either gear. (R. G. Parker and co-workers name the
     phase between both sides: Y. Guo, R. G. Parker, Mech. Mach. Theory 78, 2014.)
 
-    Of helical gears every slice of the face, at a coordinate y, is at its own phase + y tan(beta_b) / p_bt, on which
-    its coast phase falls as above: coast flanks run as drive flanks of gears of the other hand do. Face coordinates
-    are those of the drive flanks.
+    For helical gears every slice of the face, at the coordinate y, has its own phase + y tan(beta_b) / p_bt, and the
+    coast phase of the slice follows as above: coast flanks behave like drive flanks of gears of the opposite hand. Face
+    coordinates are those of the drive flanks.
 
-    What holds the gears is known along the line of action of the drive flanks alone: coast flanks meet as on rigid,
+    Supports are modelled along the line of action of the drive flanks only: coast flanks are computed on rigid,
     parallel shafts.
     """
     pair, sizes = mesh.pair, mesh.resolution
@@ -93,7 +94,7 @@ def coast_flanks(mesh: Mesh, torque: Scalar, modification: Both) -> Flanks:
 
 @program
 def _coast_phase(mesh: Mesh):
-    """First mesh position of the coast flanks, which of them belongs to the first of the drive flanks, backlash."""
+    """First mesh position of the coast flanks, index of the position of the first drive position, and backlash."""
     pair, count = mesh.pair, mesh.resolution.positions
     secant = 1 / jnp.cos(pair.working_pressure_angle)
     thickness = [tooth_thickness(gear, 2 * gear.base_radius * secant) for gear in (pair.pinion, pair.wheel)]
@@ -105,7 +106,7 @@ def _coast_phase(mesh: Mesh):
 
 
 def static(flanks: Flanks, torque: Scalar, compliance: Scalar) -> Static:
-    """Static contact of one side."""
+    """Static contact of drive or coast flanks under a torque [N m], with a series compliance [um/N]."""
     cycle = solve_removed(flanks.mesh, torque, flanks.removed)
     found = Static(cycle.unloaded_transmission_error, cycle.transmission_error, cycle.tangent_stiffness, cycle.status)
     return _in_series(found, cycle.force, compliance, flanks.order)

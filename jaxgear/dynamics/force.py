@@ -1,4 +1,4 @@
-"""The interface of a mesh force, and those of closed form."""
+"""Interface of mesh forces, and mesh forces in closed form."""
 
 from abc import abstractmethod
 from collections.abc import Callable
@@ -12,7 +12,7 @@ from jaxtyping import Array, Float, PyTree
 
 from ..numerics import Checked, bracketed_root, number, program, real
 
-# Doublings of 1 um until a bracket holds the DTE of a force; there is no root where they do not suffice.
+# Most doublings of 1 um for a bracket of the DTE of a force; beyond them no root exists.
 _DOUBLINGS = 40
 # mesh positions over which a stiffness is averaged
 POSITIONS = 32
@@ -25,12 +25,12 @@ Scalar = Float[Array, ""]
 class AbstractMeshForce(Checked):
     """Force between the flanks of a mesh on the line of action, as a function of mesh position and DTE.
 
-    The DTE q [um] is how much farther the pinion has turned than the wheel, on the line of action: under a static
-    load it is the loaded transmission error. The force [N] is positive on the drive flanks, zero in the clearance and
-    negative on the coast flanks.
+    The DTE q [um] is the lead of the pinion over the wheel on the line of action; under a static load it is the loaded
+    transmission error. The force [N] is positive on the drive flanks, zero in the clearance and negative on the coast
+    flanks.
 
-    What depends on the mesh position alone is `at` that position, so that an integrator whose steps meet the same
-    positions in every cycle works it out once. Both methods are of single numbers; `jax.vmap` makes many.
+    The method `at` computes everything that depends only on the mesh position, once for an integrator whose steps meet
+    the same positions in every cycle. Both methods take single numbers; use `jax.vmap` for many.
     """
 
     # whether the force jumps at some mesh positions: the ends of an integrator's steps then lie on the step's side
@@ -38,7 +38,7 @@ class AbstractMeshForce(Checked):
 
     @property
     def averaged_positions(self) -> int:
-        """Mesh positions over which stiffnesses are averaged."""
+        """Number of mesh positions over which stiffnesses are averaged."""
         return POSITIONS
 
     def nodes(self, steps: int) -> Float[Array, " nodes"]:
@@ -47,48 +47,48 @@ class AbstractMeshForce(Checked):
 
     @abstractmethod
     def at(self, phase: Scalar) -> PyTree[Array]:
-        """A tree of arrays: what the force at a mesh position [base pitches, any number] depends on."""
+        """Data of the force at a mesh position [base pitches], any real number; a tree of arrays for `force`."""
 
     @abstractmethod
     def force(self, place: PyTree[Array], dte: Scalar) -> Scalar:
-        """Force [N] at a place that `at` has found and a DTE [um]."""
+        """Force [N] at a DTE [um], with the data of a mesh position from `at`."""
 
     def __call__(self, phase: Scalar, dte: Scalar) -> Scalar:
         """Force [N] at a mesh position [base pitches] and a DTE [um]."""
         return self.force(self.at(phase), dte)
 
     def stiffness(self, phase: Scalar, dte: Scalar) -> Scalar:
-        """Slope of the force over the DTE [N/um]."""
+        """Tangent stiffness [N/um] at a mesh position [base pitches] and a DTE [um]."""
         place = self.at(phase)
         return jax.jvp(lambda q: self.force(place, q), (dte,), (jnp.ones_like(dte),))[1]
 
     def static_te(self, phase: Scalar, force: Scalar) -> Scalar:
         """Loaded transmission error [um] under a force [N].
 
-        A positive force has one on the drive flanks, a negative one on the coast flanks; for a force of zero it is
-        somewhere in the clearance. NaN where there is none, as for a negative force without coast flanks.
+        It lies on the drive flanks for a positive force, on the coast flanks for a negative force, and somewhere in the
+        clearance for zero. It is NaN if it does not exist, for instance for a negative force without coast flanks.
         """
         return te_under(self, self.at(phase), force)
 
     def mean_tangent_stiffness(self, force: Scalar) -> Scalar:
-        """Slope of the force under a static force [N], averaged over the mesh cycle [N/um].
+        """Mean tangent stiffness over the mesh cycle under a static force [N], in N/um.
 
-        The stiffness that a small vibration about the static transmission error meets: natural frequencies and
-        damping ratios refer to it.
+        It is the stiffness for small vibrations about the static transmission error. Natural frequencies and damping
+        ratios refer to it.
         """
         return _mean_tangent_stiffness(self, real(force))
 
     def mean_secant_stiffness(self, force: Scalar) -> Scalar:
-        """A static force [N], not zero, over the mean deflection of the mesh cycle under it [N/um].
+        """Mean secant stiffness under a static force [N] other than zero: force over mean deflection, in N/um.
 
-        The deflection is the static transmission error under the force less that at which the flanks touch: the
-        stiffness of a linear spring with the same mean deflection, below the tangent one since contacts stiffen from
-        zero on. Studies that know a static transmission error and no slope state it.
+        The deflection is the static transmission error under the force minus the transmission error at first contact.
+        The secant stiffness is below the tangent stiffness, since contacts stiffen with the load. Publications use it
+        if they only know the static transmission error.
         """
         return _mean_secant_stiffness(self, real(force))
 
     def over_cycle(self, of: Callable[[Scalar], Scalar], dtype: np.dtype) -> Scalar:
-        """Mean of a function of the mesh position over a cycle, each position for the step about it."""
+        """Mean of a function of the mesh position over a cycle, by the midpoint rule between the nodes."""
         begin = self.nodes(self.averaged_positions).astype(dtype)
         return jnp.sum(jnp.diff(begin) * jax.vmap(of)((begin[:-1] + begin[1:]) / 2))
 
@@ -108,9 +108,9 @@ def _mean_secant_stiffness(of: AbstractMeshForce, force: Scalar) -> Scalar:
 
 @partial(jax.jit, inline=True)
 def te_under(mesh_force: AbstractMeshForce, place: PyTree[Array], force: Scalar) -> Scalar:
-    """Transmission error [um] at which a mesh force has a value [N]; NaN where it has it nowhere.
+    """Transmission error [um] at which a mesh force has a given value [N]; NaN if it does not exist.
 
-    A mesh force that is NaN from some DTE on counts as larger than any value there.
+    A mesh force of NaN beyond some DTE counts as larger than any value.
     """
     args = mesh_force, place, force
     fixed = jax.lax.stop_gradient(args)
@@ -130,7 +130,7 @@ def te_under(mesh_force: AbstractMeshForce, place: PyTree[Array], force: Scalar)
 
 
 def missing(dte: Scalar, args: tuple[AbstractMeshForce, PyTree[Array], Scalar]) -> Scalar:
-    """Force [N] at a DTE [um] less the wanted one; args are (mesh force, place, wanted force)."""
+    """Force at a DTE [um] minus a given force [N]; args are (mesh force, data of the position, given force)."""
     mesh_force, place, force = args
     found = mesh_force.force(place, dte)
     return jnp.where(jnp.isnan(found), jnp.where(dte < 0, -jnp.inf, jnp.inf), found - force)
@@ -140,8 +140,8 @@ class DeadZone(AbstractMeshForce):
     """Constant stiffness on either side of a clearance (Kahraman, Singh, J. Sound Vib. 142, 1990).
 
     Attributes:
-        stiffness_constant: [N/um].
-        half_clearance: of the clearance about DTE zero [um].
+        stiffness_constant: stiffness in contact [N/um].
+        half_clearance: half of the clearance, which is centred at a DTE of zero [um].
     """
 
     stiffness_constant: Scalar = number("N/um", low=0.0, open_low=True, default=1.0)
@@ -156,11 +156,13 @@ class DeadZone(AbstractMeshForce):
 
 
 class RectangularStiffness(AbstractMeshForce):
-    """Two and one pair in turn, both of constant stiffness, without coast flanks: exact solutions are known for it.
+    """Mesh force with alternating constant stiffness of two pairs and of one, without coast flanks.
+
+    Exact solutions of its vibration are known.
 
     Attributes:
-        double, single: stiffness with two pairs and with one in contact [N/um].
-        share: of the cycle with two pairs, from mesh position 0 on.
+        double, single: stiffness with two pairs and with one pair in contact [N/um].
+        share: share of the cycle with two pairs, from mesh position 0 on.
     """
 
     jumps: ClassVar[bool] = True
@@ -170,7 +172,7 @@ class RectangularStiffness(AbstractMeshForce):
     share: Scalar = number("", low=0.0, high=1.0)
 
     def nodes(self, steps: int) -> Float[Array, " nodes"]:
-        """Half of the steps with two pairs and half with one, so that the jump lies between two steps."""
+        """Nodes with half of the steps for two pairs and half for one pair; the jump lies between two steps."""
         half = steps // 2
         double = self.share * jnp.linspace(0.0, 1.0, half + 1)
         return jnp.append(double[:-1], self.share + (1 - self.share) * jnp.linspace(0.0, 1.0, steps - half + 1))

@@ -1,4 +1,4 @@
-"""The force of a mesh from contact analyses, over mesh position and transmission error, and simpler models of it."""
+"""Mesh force from contact analyses, tabulated over mesh position and DTE, and simpler models of it."""
 
 from typing import NamedTuple
 
@@ -28,9 +28,10 @@ class Rows(NamedTuple):
     """Force over the DTE at one mesh position; first the drive, then the coast flanks.
 
     Attributes:
-        start: DTE at which the drive flanks touch, and the negative of that at which the coast flanks do [um].
-        force: at the levels of DTE beyond `start` [N], shape (sides x levels,).
-        rise: slope of the force over the number of the level [N], same shape.
+        start: DTE at which the drive flanks touch, and the negative DTE at which the coast flanks touch [um], shape
+            (2,).
+        force: force at the levels of DTE beyond `start` [N], shape (sides x levels,).
+        rise: slope of the force over the number of the level [N], shape (sides x levels,).
     """
 
     start: Sides
@@ -41,22 +42,22 @@ class Rows(NamedTuple):
 class ForceMap(WithStatus, AbstractMeshForce):
     """Force of a mesh by cubic pieces over the DTE, linear between mesh positions; made by `mesh_force`.
 
-    The force is exactly zero in the clearance, rises everywhere else with a continuous slope, and goes on linearly
+    The force is exactly zero in the clearance, rises with a continuous slope in contact, and is extrapolated linearly
     beyond the table.
 
-    Modifications are averaged over the contact width under the nominal torque, at every DTE. On a 50/50 pair with
-    6 um of relief dynamic factor and rms are then within 0.4 % of those with the width of every DTE, and their
-    derivatives by the relief within 0.9 %, at half of the natural frequency within 5 %; a map made for three times the
-    torque it runs at has up to 1.1 % (dynamic factor) and 4.8 % (rms) less.
+    Modifications are averaged over the contact width under the nominal torque, at every DTE. Compared with the contact
+    width of every DTE, on a 50/50 pair with 6 um of relief, dynamic factor and rms differ by at most 0.4 %, their
+    derivatives with respect to the relief by 0.9 %, at half of the natural frequency by 5 %. A map made for three times
+    the torque underestimates the dynamic factor by up to 1.1 % and the rms by up to 4.8 %.
 
     Attributes:
-        first_phase: mesh position with which the grid begins [base pitches].
-        start: DTE at which the drive flanks touch, and the negative of that at which the coast flanks do [um],
-            shape (2, positions).
-        reach: DTE of the last level beyond `start` [um]; the levels lie closer where the flanks begin to touch.
-        node_force: force of drive and coast flanks [N], shape (2, positions, levels), from `start` on.
-        node_stiffness: its slope over the DTE [N/um], same shape.
-        status: of all contacts of the grid.
+        first_phase: first mesh position of the grid [base pitches].
+        start: DTE at which the drive flanks touch, and the negative DTE at which the coast flanks touch [um], shape
+            (2, positions).
+        reach: DTE of the last level beyond `start` [um]; the levels lie closer together near `start`.
+        node_force: force of drive and coast flanks from `start` on [N], shape (2, positions, levels).
+        node_stiffness: slope of the force over the DTE [N/um], shape (2, positions, levels).
+        status: worst status of all contacts of the grid.
     """
 
     first_phase: Scalar = result("base pitches")
@@ -91,7 +92,7 @@ class ForceMap(WithStatus, AbstractMeshForce):
 
 
 def _level_of(closed: Scalar, reach: Scalar, levels: int) -> Scalar:
-    """Number of the level at a DTE beyond touching [um], a fraction between two: the inverse of `dte_levels`."""
+    """Fractional number of the level at a DTE beyond first contact [um]: the inverse of `dte_levels`."""
     share, bend = closed / reach, (1 - _FIRST_STEP) / _FIRST_STEP**2
     inside = 2 * share / (_FIRST_STEP * (1 + jnp.sqrt(1 + 4 * bend * jnp.clip(share, 0.0, 1.0))))
     beyond = (share - 1) / (2 - _FIRST_STEP)
@@ -99,7 +100,7 @@ def _level_of(closed: Scalar, reach: Scalar, levels: int) -> Scalar:
 
 
 def dte_levels(reach: Scalar, levels: int) -> Float[Array, " levels"]:
-    """DTE of the levels beyond touching [um]: parabolic in their number, from 0 to the reach."""
+    """DTE of the levels beyond first contact [um], parabolic in their number from 0 to the reach, shape (levels,)."""
     share = jnp.linspace(0.0, 1.0, levels, dtype=reach.dtype)
     return reach * share * (_FIRST_STEP + (1 - _FIRST_STEP) * share)
 
@@ -111,7 +112,7 @@ def distances(reach: Scalar, levels: int) -> Float[Array, " levels"]:
 
 
 def between(phase: Scalar, first: Scalar, count: int) -> tuple[Int[Array, ""], Int[Array, ""], Scalar]:
-    """The places of a periodic grid on both sides of a mesh position, and what share of the way it is to the second."""
+    """Indices of the two neighbours of a mesh position on a periodic grid, and the relative distance from the first."""
     place = (phase - first) * count
     lower = jnp.floor(place)
     index = lower.astype(jnp.int32) % count
@@ -119,7 +120,7 @@ def between(phase: Scalar, first: Scalar, count: int) -> tuple[Int[Array, ""], I
 
 
 def closing(start: Sides, dte: Scalar) -> tuple[Bool[Array, ""], Scalar]:
-    """Whether the drive flanks are nearer than the coast flanks, and how far the nearer ones are past touching [um]."""
+    """True if the drive flanks are nearer to contact than the coast flanks, and the DTE beyond their contact [um]."""
     drive = dte >= 0.5 * (start[0] - start[1])
     return drive, jnp.where(drive, dte - start[0], -dte - start[1])
 
@@ -130,14 +131,15 @@ def tabulate(
 ) -> tuple[Float[Array, "positions levels"], Float[Array, "positions levels"], Statuses]:
     """Force [N] and slope [N/um] of one side at levels of the DTE, shape (positions, levels) each, and their status.
 
-    Called as it is, it runs for a hundredth of the time that it compiles, and a gear pair needs it twice.
+    Compilation takes a hundred times as long as the computation; a gear pair needs the function twice.
 
     Args:
-        flanks: of one side.
-        unloaded: DTE at which the flanks touch [um], in the order of the drive flanks as what is returned.
-        compliance: in series [um/N].
-        reach: of the last level [um].
-        levels: their number.
+        flanks: drive or coast flanks.
+        unloaded: DTE at which the flanks touch [um], shape (positions,), like the results in the order of the drive
+            flanks.
+        compliance: compliance in series [um/N].
+        reach: DTE of the last level [um].
+        levels: number of levels.
     """
     above, apart = dte_levels(reach, levels)[1:], distances(reach, levels)
     own = unloaded[flanks.order]  # which is its own inverse: of the drive flanks the identity
@@ -162,7 +164,7 @@ Curves = Float[Array, "sides positions"]
 
 
 class Springs(NamedTuple):
-    """Drive and coast flanks as two springs at one mesh position: where they touch [um], stiffness [N/um]."""
+    """Springs of drive and coast flanks at one mesh position: DTE at first contact [um] and stiffness [N/um]."""
 
     start: Sides
     stiffness: Sides
@@ -174,20 +176,20 @@ def _mixed(curves: Curves, phase: Scalar, first: Scalar) -> Sides:
 
 
 class FlankSprings(WithStatus, AbstractMeshForce):
-    """Drive and coast flanks as one spring each beyond where they touch: k (q - start(phase)), no contact between.
+    """Mesh force of one linear spring each for drive and coast flanks, k (q - start(phase)), zero in the clearance.
 
-    With a stiffness that varies, k(phase) (q - e_u(phase)), it is that of the whole deflection under the torque that
-    the force was made for: right for this load and every mesh position, and no other. How much of the teeth is in
-    contact does not change with the DTE. With a constant one the loaded transmission error excites a mean stiffness
-    without parametric excitation, k (q - q_0(phase) + F_0 / k), as A. Kahraman and R. Singh have it.
+    A varying stiffness, k(phase) (q - e_u(phase)), is the secant stiffness under the torque of the force: it is exact
+    for this load at every mesh position, but not for other loads, as the contact does not change with the DTE. A
+    constant stiffness is excited by the loaded transmission error without parametric excitation,
+    k (q - q_0(phase) + F_0 / k), as in A. Kahraman and R. Singh.
 
     Attributes:
-        first_phase: mesh position with which the curves begin [base pitches].
-        start: DTE at which the drive flanks touch, and the negative of that at which the coast flanks do [um],
-            shape (2, positions); of a constant stiffness the static transmission error under the load less F_0 / k.
-        spring_stiffness: of drive and coast flanks [N/um], F_0 over the deflection, shape (2, positions), or over its
-            mean, shape (2,).
-        status: of all contacts.
+        first_phase: first mesh position of the curves [base pitches].
+        start: DTE at which the drive flanks touch, and the negative DTE at which the coast flanks touch [um], shape
+            (2, positions); for a constant stiffness the static transmission error under the load minus F_0 / k.
+        spring_stiffness: stiffness of drive and coast flanks [N/um]: F_0 over the deflection, shape (2, positions), or
+            over the mean deflection, shape (2,).
+        status: worst status of all contacts.
     """
 
     first_phase: Scalar = result("base pitches")
@@ -206,14 +208,14 @@ class FlankSprings(WithStatus, AbstractMeshForce):
 
 
 class Tangent(WithStatus, AbstractMeshForce):
-    """The force to first order about its static value: F_0 + k(phase) (q - q_0(phase)); no clearance, small vibration.
+    """Linearized mesh force F_0 + k(phase) (q - q_0(phase)) for small vibrations, without clearance.
 
     Attributes:
-        first_phase: mesh position with which the curves begin [base pitches].
-        static_force: F_0 [N].
-        dte: q_0, static transmission error [um], shape (positions,).
-        tangent_stiffness: slope of the force there [N/um], shape (positions,).
-        status: of all contacts.
+        first_phase: first mesh position of the curves [base pitches].
+        static_force: static force F_0 [N].
+        dte: static transmission error q_0 [um], shape (positions,).
+        tangent_stiffness: tangent stiffness k at q_0 [N/um], shape (positions,).
+        status: worst status of all contacts.
     """
 
     first_phase: Scalar = result("base pitches")

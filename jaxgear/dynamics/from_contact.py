@@ -1,4 +1,4 @@
-"""Mesh forces of a prepared mesh: the map of its contact, and simpler models of it."""
+"""Mesh forces of a prepared mesh: the force map of its contact, and simpler models."""
 
 from collections.abc import Callable
 from typing import Any, Literal, get_args
@@ -44,35 +44,36 @@ def mesh_force(
 ) -> AbstractMeshForce:
     """Force of a mesh as a function of mesh position and DTE, for oscillators.
 
-    The DTE is that of the teeth, of the wind-up of the gear bodies (`mesh.hub`) and of `compliance` in series.
+    The DTE includes the deflection of the teeth, the wind-up of the gear bodies (`mesh.hub`) and `compliance` in
+    series.
 
     Args:
         mesh: prepared mesh, of any number of positions.
-        torque: on the pinion [N m], positive. For the map it sets the width of the contacts over which modifications
-            are averaged, and with `reach` how far the table goes; the simpler models are made for it.
+        torque: positive torque on the pinion [N m]. For the map it sets the contact width over which modifications are
+            averaged and, with `reach`, the largest DTE of the table; the simpler models are made for it.
         pinion: modification of the drive flanks of the pinion; None for the nominal involute.
-        wheel: likewise of the wheel.
-        coast: modifications of the coast flanks of (pinion, wheel), None of either for the nominal involute; None for
-            those of the drive flanks.
+        wheel: modification of the drive flanks of the wheel; None for the nominal involute.
+        coast: modifications of the coast flanks (pinion, wheel), each None for the nominal involute; None for the
+            modifications of the drive flanks.
         model: "map" for `ForceMap`, the contact at every DTE; "varying stiffness" and "loaded error" for
-            `FlankSprings`, "tangent" for `Tangent`: all give the static transmission error of the torque.
-        positions: mesh positions of the force, which is linear between them: the DTE at which a pair comes into
-            contact changes by several um from one of 64 positions to the next, so that they limit how near the map is
-            to the contact analysis (half a percent needs 512). An integrator whose steps meet these positions alone
-            needs no more than it has steps.
-        levels: number of DTEs of the map on either side of the clearance, closer together where it ends.
-        reach: largest deflection of the map, relative to the largest static one of the drive flanks; the map is
+            `FlankSprings`; "tangent" for `Tangent`. All give the static transmission error of the torque.
+        positions: number of mesh positions of the force, which is linear between them. They limit the accuracy of the
+            map: with 64 positions the DTE at which a pair comes into contact changes by several um between neighbours;
+            half a percent needs 512. For an integrator, positions beyond its number of steps have no effect.
+        levels: number of DTE levels of the map on either side of the clearance, closer together near first contact.
+        reach: largest deflection of the map, relative to the largest static deflection of the drive flanks; the map is
             linear beyond.
-        compliance: of shafts, bearings and bodies in series with the mesh [um/N].
-        deviation: material that manufacturing deviations remove besides from the drive flanks [um], shape (pairs,
-            slices, positions) of the mesh; linear between its positions. None for nominal gears.
+        compliance: compliance of shafts, bearings and bodies in series with the mesh [um/N].
+        deviation: material removed from the drive flanks by manufacturing deviations [um], in addition to the
+            modifications, shape (pairs, slices, positions) of the mesh; linear between its positions. None for nominal
+            gears.
 
     Returns:
-        the mesh force, differentiable with respect to every number. Where the number of pairs was left open, is too
-        small for the deflections of the map, and nothing is traced, it is made of more of them.
+        the mesh force, differentiable with respect to every number. If the number of pairs of the mesh was chosen
+        automatically and is too small for the deflections of the map, more pairs are used, unless traced.
 
     Raises:
-        TypeError: for something else than a prepared mesh or modifications.
+        TypeError: if the arguments are not a prepared mesh or modifications.
         ValueError: for a number outside its range, flanks that jam, or a modification that varies along the face on a
             mesh of one slice.
     """
@@ -96,7 +97,7 @@ def force_and_mesh(
     levels: int = _LEVELS,
     reach: Given = _REACH,
 ) -> tuple[AbstractMeshForce, Mesh]:
-    """`mesh_force`, and the mesh that it was made on."""
+    """Mesh force as from `mesh_force`, and the mesh of its contact analyses."""
     check_mesh(mesh)
     torque = operating_point_of(torque, mesh.slice_width.dtype).torque
     check("torque", torque, "N m", low=0.0, open_low=True)
@@ -118,7 +119,7 @@ def force_and_mesh(
 
 
 def interpolated(deviation: Given, of: Mesh, mesh: Mesh) -> Float[Array, "pairs slices positions"]:
-    """Material that deviations remove on another mesh of the same gears."""
+    """Material removed by deviations [um], interpolated to the positions of another mesh of the same gears."""
     wanted = of.resolution.chosen_pairs, of.resolution.slices, of.resolution.positions
     if jnp.shape(deviation) != wanted:
         raise ValueError(f"deviation has shape {jnp.shape(deviation)}, must be {wanted} (pairs, slices, positions)")
@@ -136,7 +137,7 @@ def interpolated(deviation: Given, of: Mesh, mesh: Mesh) -> Float[Array, "pairs 
 
 
 def _besides(deviation: Given | None, of: Mesh, mesh: Mesh) -> Array | None:
-    """`interpolated`; None where there are no deviations."""
+    """Deviations `interpolated` to a mesh; None without deviations."""
     return None if deviation is None else interpolated(deviation, of, mesh)
 
 
@@ -201,7 +202,7 @@ def _map_of(first_phase: Any, start: Array, reach: Scalar, tables: list[Any], st
 
 
 def _of_both(function: Callable[[Any], Any], sides: tuple[Any, Any]) -> list[Any]:
-    """A function of each side; as a part of another program in a loop, so that it is compiled once."""
+    """Apply a function to each side; within another program by a loop, so that it is compiled once."""
     (drive, like), (coast, other) = (eqx.partition(side, eqx.is_array) for side in sides)
     trees: list[Any] = [jax.tree.structure(arrays) for arrays in (drive, coast)]
     if is_eager() or trees[0] != trees[1] or not eqx.tree_equal(like, other):
@@ -212,7 +213,7 @@ def _of_both(function: Callable[[Any], Any], sides: tuple[Any, Any]) -> list[Any
 
 
 def _check_clearance(least: Scalar) -> None:
-    """Refuses flanks that press on both sides without a load, where the numbers are concrete."""
+    """Raise for concrete flanks that jam: contact on both sides without a load."""
     known = concrete(least)
     if known is not None and known < -_JAMMED:
         raise ValueError(

@@ -1,4 +1,4 @@
-"""Fixed steps that meet the same mesh positions in every cycle, and what one recorded orbit says."""
+"""Fixed steps that meet the same mesh positions in every cycle, and statistics of a recorded motion."""
 
 from typing import Any, NamedTuple
 
@@ -23,9 +23,9 @@ class Steps(NamedTuple):
     """One mesh cycle in steps; every field has the leading axis (steps,).
 
     Attributes:
-        first, middle, last: places of the mesh force at the begin, in the middle and at the end of every step.
-        phase: where every step begins [base pitches].
-        length: of every step [base pitches].
+        first, middle, last: data of the mesh force at the start, in the middle and at the end of every step.
+        phase: mesh position at the start of every step [base pitches].
+        length: length of every step [base pitches].
     """
 
     first: Any
@@ -72,16 +72,16 @@ def one_cycle(oscillator: Oscillator, y: State, steps: Steps, mesh_frequency: Sc
 def cycles(
     oscillator: Oscillator, y: State, steps: Steps, mesh_frequency: Scalar, count: int
 ) -> tuple[State, Recorded]:
-    """State after some cycles, and the states at the begin of every step, leading axes (count, steps)."""
+    """State after `count` cycles, and the states at the start of every step, leading axes (count, steps)."""
     return jax.lax.scan(lambda y, _: one_cycle(oscillator, y, steps, mesh_frequency), y, length=count)
 
 
 class Cycle(NamedTuple):
-    """Mesh positions of a cycle so close that steps of two, four, eight ... of their distances are taken from them.
+    """Fine mesh positions of a cycle, from which steps over two, four, eight ... intervals are taken.
 
     Attributes:
-        after: places of the mesh force at the positions, where it jumps just after them, leading axis (positions,).
-        before: just before the positions, the first of them the second position; None where nothing jumps.
+        after: data of the mesh force at the positions, at a jump just after them, leading axis (positions,).
+        before: data just before the positions, starting with the second position; None for a force without jumps.
         nodes: the positions and the end of the cycle [base pitches], shape (positions + 1,).
     """
 
@@ -91,9 +91,9 @@ class Cycle(NamedTuple):
 
 
 def cycle_of(oscillator: Oscillator, steps: int) -> Cycle:
-    """Mesh positions for so many steps per cycle, and for every half of that down to two steps.
+    """Mesh positions for a number of steps per cycle, and for its halves down to two steps.
 
-    The positions that the force asks for are ends of the steps, never the middle of one.
+    Nodes of the mesh force are ends of steps, never in the middle of a step.
     """
     ends = oscillator.mesh_force.nodes(steps).astype(oscillator.mass.dtype)
     nodes = jnp.zeros(2 * steps + 1, ends.dtype).at[::2].set(ends).at[1::2].set((ends[:-1] + ends[1:]) / 2)
@@ -102,12 +102,13 @@ def cycle_of(oscillator: Oscillator, steps: int) -> Cycle:
 
 
 def nodes_of(index: Int[Array, ""], stride: Int[Array, ""]) -> Int[Array, "3"]:
-    """Positions of a cycle at the begin, in the middle and at the end of a step over an even number of them."""
+    """Indices of the positions at the start, in the middle and at the end of a step over an even number of intervals.
+    """
     return index * stride + jnp.stack([jnp.zeros_like(stride), stride // 2, stride])
 
 
 def step_of(cycle: Cycle, index: Int[Array, ""], stride: Int[Array, ""]) -> Steps:
-    """One step over an even number of positions; neither it nor its number need be known to the compiler."""
+    """One step over an even number of intervals; index and stride may be traced."""
     begin, middle, end = nodes_of(index, stride)
 
     def at(places, place):
@@ -128,15 +129,16 @@ SIMPSON = (1 / 6, 4 / 6, 1 / 6)  # weights of the three places of a step
 
 
 class History(NamedTuple):
-    """DTE and force over some recorded cycles, in three places of every step, one step after the other.
+    """DTE and mesh force over recorded cycles, at three places of every step, shape (3, samples).
 
     Attributes:
-        phase: where every step begins [base pitches], from 0 at the begin of the first cycle on.
-        length: of every step [base pitches].
-        dte: dynamic transmission error (DTE) [um]; in the middle of a step by the cubic that fits values and
-            velocities at its ends.
-        velocity: of the DTE at the begin of every step [um/s].
-        force: elastic force of the mesh [N], on the step's side where it jumps.
+        phase: mesh position at the start of every step [base pitches], 0 at the start of the first cycle, shape
+            (samples,).
+        length: length of every step [base pitches], shape (samples,).
+        dte: dynamic transmission error (DTE) [um]; in the middle of a step from the cubic through values and velocities
+            at its ends.
+        velocity: velocity of the DTE at the start of every step [um/s], shape (samples,).
+        force: elastic force of the mesh [N]; at a jump the value on the side of the step.
     """
 
     phase: Samples
@@ -147,14 +149,14 @@ class History(NamedTuple):
 
 
 def history(oscillator: Oscillator, states: Recorded, end: State, steps: Steps, mesh_frequency: Scalar) -> History:
-    """The history of recorded cycles.
+    """DTE and mesh force of recorded cycles.
 
     Args:
-        oscillator: that moved.
-        states: at the begin of every step, leading axes (cycles, steps), as `integrate.cycles` gives them.
+        oscillator: the oscillator.
+        states: states at the start of every step, leading axes (cycles, steps), from `integrate.cycles`.
         end: state after the last step.
-        steps: of a cycle.
-        mesh_frequency: [Hz].
+        steps: steps of a cycle.
+        mesh_frequency: mesh frequency [Hz].
     """
     count, size = states[0].shape[:2]
     x, v = (part.reshape(count * size, -1) for part in states)
@@ -183,7 +185,7 @@ def mean(of: History, values: Thirds) -> Scalar:
 
 
 def rms(of: History, values: Thirds) -> Scalar:
-    """Root mean square about the mean; without a derivative where nothing moves."""
+    """Root mean square about the mean; the derivative of a constant is zero."""
     square = mean(of, (values - mean(of, values)) ** 2)
     still = square <= 0
     return jnp.where(still, 0.0, jnp.sqrt(jnp.where(still, 1.0, square)))
@@ -192,8 +194,8 @@ def rms(of: History, values: Thirds) -> Scalar:
 def largest(values: Thirds) -> Scalar:
     """Largest value over time, by the parabola through the three values of every step.
 
-    It moves smoothly with the orbit, from one step to the next as well, and differs from the largest of the samples by
-    the square of the step.
+    It is a smooth function of the orbit, also from one step to the next, and differs from the largest sample by the
+    order of the square of the step.
     """
     begin, middle, end = values
     bend = 2 * begin - 4 * middle + 2 * end
@@ -205,10 +207,10 @@ def largest(values: Thirds) -> Scalar:
 
 
 def smallest(values: Thirds) -> Scalar:
-    """Smallest value over time, as `largest`."""
+    """Smallest value over time, by the parabola through the three values of every step."""
     return -largest(-values)
 
 
 def share(of: History, holds: Array) -> Scalar:
-    """Share of the time in which something holds, shape (3, samples); it has no derivative."""
+    """Share of the time in which a condition of shape (3, samples) is true; it has no derivative."""
     return mean(of, holds.astype(of.dte.dtype))

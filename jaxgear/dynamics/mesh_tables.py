@@ -38,25 +38,27 @@ def _table(meaning: str) -> Any:
 
 @dataclass(frozen=True, eq=False)
 class MeshTables(WithStatus):
-    """Tables of a mesh over one cycle; made by `mesh_tables`, and what `mesh.npz` holds, name by name.
+    """Tables of a mesh over one cycle; made by `mesh_tables`. The file `mesh.npz` has an array of each name.
 
     Attributes:
-        torque: on the pinion for which stiffness orders and the force map are made [N m].
-        torques: on the pinion, rising [N m], shape (torques,).
+        torque: torque on the pinion for the force map [N m].
+        torques: torques on the pinion in ascending order [N m], shape (torques,).
         phase: mesh positions [base pitches], shape (positions,).
-        transmission_error: loaded [um], shape (torques, positions).
-        stiffness: d force / d transmission error at a fixed position [N/um], same shape.
-        order: of the mesh frequency, shape (orders,).
-        amplitude: of the transmission error [um], shape (torques, orders).
-        order_phase: of the same [deg], TE = mean + sum of amplitude cos(360 deg order phase + order_phase).
+        transmission_error: loaded transmission error [um], shape (torques, positions).
+        stiffness: tangent stiffness d force / d transmission error at a fixed position [N/um], shape (torques,
+            positions).
+        order: orders of the mesh frequency, shape (orders,).
+        amplitude: amplitudes of the transmission error [um], shape (torques, orders).
+        order_phase: phase angles of the transmission error [deg], shape (torques, orders);
+            TE = mean + sum of amplitude cos(360 deg order phase + order_phase).
         map_phase: mesh positions of the force map [base pitches], shape (map_positions,).
-        map_dte: rising dynamic transmission errors of the force map [um], shape (map_positions, nodes).
-        map_force: there [N], same shape.
-        teeth: of pinion and wheel, shape (2,).
-        base_radius: of pinion and wheel [mm], shape (2,).
-        inertia: of both bodies, rings from bore to reference circle [kg m2], shape (2,).
-        equivalent_mass: of both on the line of action [kg].
-        status: of all contacts.
+        map_dte: ascending dynamic transmission errors of the force map [um], shape (map_positions, nodes).
+        map_force: mesh force [N], shape (map_positions, nodes).
+        teeth: numbers of teeth of pinion and wheel, shape (2,).
+        base_radius: base radii of pinion and wheel [mm], shape (2,).
+        inertia: moments of inertia of both bodies, rings from bore to reference circle [kg m2], shape (2,).
+        equivalent_mass: equivalent mass of both gears on the line of action [kg].
+        status: worst status of all contacts.
     """
 
     torque: float = _table("torque on the pinion of the force map [N m]")
@@ -81,11 +83,11 @@ class MeshTables(WithStatus):
     status: np.ndarray = _table("0 where all contacts converged")
 
     def write(self, folder: str | Path) -> None:
-        """Writes `mesh.npz` and the tables as CSV into a folder; what units, signs and axes are stands in each file.
+        """Write `mesh.npz` and the tables as CSV into a folder; each file describes its units, signs and axes.
 
         Raises:
-            ValueError: where a contact did not converge.
-            OSError: when a file cannot be written.
+            ValueError: if a contact has not converged.
+            OSError: if a file cannot be written.
         """
         if not self.converged:
             raise ValueError("MeshTables.write: a contact did not converge, must have converged at all positions")
@@ -141,18 +143,18 @@ def mesh_tables(
     """Stiffness and transmission error over phase and torque, their orders, and the force over phase and DTE.
 
     Args:
-        mesh: prepared mesh; its positions are those of stiffness and transmission error.
-        torque: on the pinion [N m], positive, of the force map.
-        torques: further ones of stiffness and transmission error [N m], in any order.
+        mesh: prepared mesh; stiffness and transmission error are tabulated at its positions.
+        torque: positive torque on the pinion for the force map [N m].
+        torques: further torques for stiffness and transmission error [N m], in any order.
         pinion: modification of the pinion flank; None for the nominal involute.
-        wheel: likewise of the wheel.
-        orders: of the transmission error, fewer than half of the positions; None for up to 10.
-        positions: mesh positions of the force map, see `mesh_force`.
-        levels: likewise its levels.
+        wheel: modification of the wheel flank; None for the nominal involute.
+        orders: number of orders of the transmission error, fewer than half of the positions; None for up to 10.
+        positions: number of mesh positions of the force map, see `mesh_force`.
+        levels: number of DTE levels of the force map, see `mesh_force`.
 
     Raises:
-        TypeError: for something else than a prepared mesh or modifications.
-        ValueError: in one line for a number outside its range, and where `mesh_force` raises one.
+        TypeError: if the arguments are not a prepared mesh or modifications.
+        ValueError: in one line for a number outside its range, and for all errors of `mesh_force`.
     """
     check_mesh(mesh)
     most = (mesh.resolution.positions - 1) // 2

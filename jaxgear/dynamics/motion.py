@@ -17,16 +17,15 @@ Samples = Float[Array, " samples"]
 
 
 class Motion(Checked):
-    """Result of `motion`, at the begin of every step of the integrator.
+    """Motion of an oscillator at the start of every step of the integrator; result of `motion`.
 
     Attributes:
         phase: mesh position [base pitches], shape (samples,).
         dte: dynamic transmission error (DTE) [um], shape (samples,).
-        dte_rate: [um/s], shape (samples,).
-        force: elastic force of the mesh [N], shape (samples,): zero where nothing touches, negative on the coast
-            flanks.
-        support_force: by which springs and dampers to ground and between coordinates hold every coordinate [N], shape
-            (samples, coordinates); `on_bearings` says which are the bearings of pinion and wheel.
+        dte_rate: rate of the DTE [um/s], shape (samples,).
+        force: elastic force of the mesh [N], shape (samples,): zero without contact, negative on the coast flanks.
+        support_force: force of springs and dampers, to ground and between coordinates, on every coordinate [N], shape
+            (samples, coordinates); the coordinates of the bearings are described in `on_bearings`.
     """
 
     phase: Samples = result()
@@ -39,11 +38,11 @@ class Motion(Checked):
 def motion(
     oscillator: Oscillator, mesh_frequency: Given, start: Start, *, periods: int = 1, steps: Numbers = STEPS
 ) -> Motion:
-    """The motion from a state over some mesh cycles.
+    """Motion from a given state over a number of mesh cycles.
 
     Args:
-        oscillator: that moves.
-        mesh_frequency: [Hz], a single number.
+        oscillator: the oscillator.
+        mesh_frequency: mesh frequency [Hz], shape ().
         start: displacements [um] and velocities [um/s] at mesh position 0, each of shape (coordinates,).
         periods: number of mesh cycles.
         steps: number of equal steps of a mesh cycle, or its nodes from 0 to 1 [base pitches].
@@ -79,14 +78,15 @@ SAMPLES = 200  # stretches for which extremes are given
 
 
 class RunUp(Checked):
-    """Vibration during a change of speed, sampled over stretches of whole mesh cycles.
+    """Vibration during a change of speed; every sample is an interval of whole mesh cycles.
 
     Attributes:
-        time: at the end of every stretch [s], shape (samples,).
-        mesh_frequency: there [Hz], shape (samples,).
-        dynamic_factor: largest elastic mesh force of the stretch over the static force, shape (samples,).
-        dte_min, dte_max: of the stretch [um], shape (samples,).
-        state: coordinates [um] and velocities [um/s] at the end of every stretch, each of shape (samples, coordinates).
+        time: time at the end of every interval [s], shape (samples,).
+        mesh_frequency: mesh frequency at the end of every interval [Hz], shape (samples,).
+        dynamic_factor: largest elastic mesh force in the interval over the static force, shape (samples,).
+        dte_min, dte_max: extremes of the DTE in the interval [um], shape (samples,).
+        state: coordinates [um] and velocities [um/s] at the end of every interval, each of shape (samples,
+            coordinates).
     """
 
     time: Samples = result("s")
@@ -107,23 +107,23 @@ def run_up(
     start: State | None = None,
     steps: int | None = None,
 ) -> RunUp:
-    """A change of speed at constant acceleration; a run-down where `last` is below `first`.
+    """Vibration during a run-up at constant acceleration; a run-down if `last` is below `first`.
 
-    Steps are equal in mesh position, so that the mesh force is met at the same positions in every cycle. With the
+    Steps are equal in mesh position, so that the mesh force is evaluated at the same positions in every cycle. With the
     frequency f(t) = first + (last - first) t / duration, f^2 is linear in the mesh position: over a step of length L
     it grows by 2 L (last - first) / duration. A step is integrated at the frequency that covers it in its time.
 
     Args:
         oscillator: one oscillator.
         first, last: mesh frequencies between which the speed changes [Hz].
-        duration: [s]; it is rounded to a whole number of mesh cycles per sample.
-        samples: stretches for which extremes are given.
-        start: coordinates and velocities at mesh position 0; None for the static equilibrium.
-        steps: of the integrator per mesh cycle, even; None for as many as the lower speed needs.
+        duration: duration of the change [s], rounded to a whole number of mesh cycles per sample.
+        samples: number of intervals for which extremes are returned.
+        start: coordinates [um] and velocities [um/s] at mesh position 0; None for the static equilibrium.
+        steps: even number of steps of the integrator per mesh cycle; None for the number that the lower speed needs.
 
     Raises:
-        ValueError: in one line for a number outside its range, a change too short for so many samples, or what is
-            being traced.
+        ValueError: in one line for a number outside its range, a duration too short for the samples, or traced
+            arguments.
     """
     low, high = _number("first", first, "Hz"), _number("last", last, "Hz")
     time = _number("duration", duration, "s")

@@ -38,26 +38,27 @@ _SAME = 0.05  # largest distance of an orbit from the settled state that it refi
 
 
 class Orbit(WithStatus, Checked):
-    """A periodic orbit: the state repeats after some mesh cycles. Leading axes of a batch come from `jax.vmap`.
+    """Periodic orbit, whose state repeats after `periods` mesh cycles; `jax.vmap` adds leading batch axes.
 
     Attributes:
-        displacement, velocity: of the coordinates at mesh position 0 [um], [um/s], shape (coordinates,).
-        mesh_frequency: [Hz].
+        displacement, velocity: displacements [um] and velocities [um/s] of the coordinates at mesh position 0, shape
+            (coordinates,).
+        mesh_frequency: mesh frequency [Hz].
         periods: number of mesh cycles after which the state repeats.
-        phase: where the samples lie [base pitches], from 0 to `periods`, shape (samples,).
+        phase: mesh positions of the samples [base pitches], from 0 to `periods`, shape (samples,).
         dte: dynamic transmission error (DTE) [um], shape (samples,).
-        dte_rate: its velocity [um/s], shape (samples,).
+        dte_rate: rate of the DTE [um/s], shape (samples,).
         force: elastic force of the mesh [N], shape (samples,).
-        dynamic_factor: largest force over the static one, which is the mean over the cycle at rest where springs carry
-            some of the load.
+        dynamic_factor: largest force over the static force; the static force is the mean over the cycle at rest if
+            springs carry a part of the load.
         dte_rms: root mean square of the DTE about its mean [um].
-        dte_mean, dte_min, dte_max: [um].
+        dte_mean, dte_min, dte_max: mean and extremes of the DTE [um].
         contact_loss_share, back_side_contact: share of the time without force, and with force on the coast flanks;
             they have no derivative.
-        monodromy: derivative of the state after the orbit by the state before, of displacements and of velocities
-            divided by 2 pi times the mesh frequency, shape (2 coordinates, 2 coordinates).
-        residual: largest change of those unknowns over the orbit [um].
-        status: `converged` where the residual is down to what rounding and the size of the multipliers leave.
+        monodromy: derivative of the state after the orbit with respect to the state before, in displacements and
+            velocities / (2 pi mesh frequency), shape (2 coordinates, 2 coordinates).
+        residual: largest change over the orbit of displacements and velocities / (2 pi mesh frequency) [um].
+        status: `converged` if the residual is within rounding, scaled by the size of the multipliers.
     """
 
     displacement: Coordinates = result("um")
@@ -90,17 +91,17 @@ class Orbit(WithStatus, Checked):
         return 0.5 * (self.dte_max - self.dte_min)
 
     def harmonic(self, order: Given) -> Complex[Array, ""]:
-        """Complex amplitude c [um] of the DTE ~ Re(c e^(2 pi i order phase)), of any order; of a single orbit."""
+        """Complex amplitude c [um] of any order, DTE ~ Re(c e^(2 pi i order phase)); not for batches of orbits."""
         return _harmonic(self.phase, self.dte, real(order), self.periods)
 
     @property
     def multipliers(self) -> Complex[Array, "... unknowns"]:
-        """Floquet multipliers: what becomes of small deviations over one orbit."""
+        """Floquet multipliers, the growth factors of small deviations over one orbit, shape (2 coordinates,)."""
         return jnp.linalg.eigvals(self.monodromy)
 
     @property
     def stable(self) -> Bool[Array, "..."]:
-        """Whether no small deviation grows: no multiplier lies outside of the unit circle."""
+        """True for a stable orbit: no multiplier lies outside the unit circle."""
         return _stable(self.monodromy)
 
 
@@ -118,28 +119,28 @@ def _harmonic(phase: Samples, dte: Samples, order: Scalar, periods: int) -> Comp
 
 
 def outside(moduli: Float[Array | np.ndarray, "..."]) -> Bool[Array | np.ndarray, "..."]:
-    """Which multipliers lie outside of the unit circle."""
+    """True for multipliers outside the unit circle, from their moduli, within rounding."""
     return ~(moduli <= 1 + _NEUTRAL * np.sqrt(jnp.finfo(moduli.dtype).eps))
 
 
 def find_orbit(
     oscillator: Oscillator, mesh_frequency: Given, start: Start, *, periods: int = 1, steps: Numbers = STEPS
 ) -> Orbit:
-    """The periodic orbit next to a state, stable or not.
+    """Find the periodic orbit next to a state, stable or unstable.
 
-    Newton's method on the change of the state over `periods` mesh cycles, by Runge-Kutta steps of order four. Every
-    number of the orbit is differentiable with respect to every number of the oscillator and to the mesh frequency, by
-    the implicit function theorem, in forward and reverse mode: those of an isolated orbit, so not at a fold.
+    Newton's method finds a zero of the change of the state over `periods` mesh cycles, integrated by Runge-Kutta steps
+    of order four. The results are differentiable with respect to every number of the oscillator and to the mesh
+    frequency, in forward and reverse mode, by the implicit function theorem; at a fold no derivatives exist.
 
     Args:
-        oscillator: that moves.
-        mesh_frequency: [Hz], a single number.
+        oscillator: the oscillator.
+        mesh_frequency: mesh frequency [Hz], shape ().
         start: displacements [um] and velocities [um/s] at mesh position 0, each of shape (coordinates,), not far from
             the orbit; no derivative passes through them.
         periods: mesh cycles after which the orbit repeats.
-        steps: number of steps of a mesh cycle, laid out by the mesh force; or their ends from 0 to 1 [base pitches],
-            with one wherever the force jumps. A kink of the force inside of a step, as where stiff flanks part, costs
-            the derivatives all but one order of the step.
+        steps: number of steps of a mesh cycle, placed by the mesh force; or their ends from 0 to 1 [base pitches], one
+            of them at every jump of the force. A kink of the force within a step, for instance where stiff flanks
+            separate, reduces the derivatives to first order in the step.
 
     Raises:
         TypeError: for something else than an `Oscillator`.
@@ -152,13 +153,13 @@ def find_orbit(
 def settle(
     oscillator: Oscillator, mesh_frequency: Given, start: Start, *, cycles: int = 100, steps: Numbers = STEPS
 ) -> State:
-    """The state after some mesh cycles, at mesh position 0; it has no derivatives.
+    """State at mesh position 0 after a number of mesh cycles; it has no derivatives.
 
     With a damping ratio zeta deviations decay by exp(-2 pi zeta f_n / f) per cycle.
 
     Args:
         oscillator, mesh_frequency, start, steps: as for `find_orbit`.
-        cycles: how many.
+        cycles: number of mesh cycles.
 
     Raises:
         TypeError, ValueError: as `find_orbit`.
@@ -176,14 +177,14 @@ def steady_orbit(
     periods: int = 1,
     steps: Numbers = STEPS,
 ) -> Orbit:
-    """The orbit on which the motion from a start settles: a stable one, with exact derivatives.
+    """Find the stable orbit on which the motion from a start settles, with exact derivatives.
 
-    After some cycles, which no derivative passes through, Newton's method takes the state to the orbit. It has not
-    converged where the motion does not settle on an orbit of so many mesh cycles: where that is unstable or far away.
-    What is returned is then those cycles themselves.
+    The motion is integrated over `settle` mesh cycles without derivatives; Newton's method then finds the orbit. The
+    result has not converged if the motion does not settle on an orbit of `periods` mesh cycles, because that orbit is
+    unstable or far away; it then contains the integrated cycles.
 
     Args:
-        oscillator, mesh_frequency, start, periods, steps: as for `find_orbit`; the start may be anything.
+        oscillator, mesh_frequency, start, periods, steps: as for `find_orbit`; the start need not be near the orbit.
         settle: number of mesh cycles before Newton's method, for instance 5 / (2 pi zeta f_n / f) with a damping
             ratio zeta.
 
@@ -204,14 +205,14 @@ def steady_orbits(
     periods: int = 1,
     steps: Numbers = STEPS,
 ) -> Orbit:
-    """`steady_orbit` at many speeds, each from a state of its own: what objectives over a speed band are made of.
+    """Find steady orbits at many speeds, each from its own start, for objectives over a speed range.
 
-    The starts are the settled states of a sweep over the speed, so that every orbit lies on the branch that the sweep
-    was on. A smooth worst case is `reductions.Max().soft(orbits.dynamic_factor, width)`.
+    Use the states of a speed sweep as starts: every orbit then lies on the branch of the sweep. A smooth worst case is
+    `reductions.Max().soft(orbits.dynamic_factor, width)`.
 
     Args:
         oscillator, settle, periods, steps: as for `steady_orbit`.
-        mesh_frequencies: [Hz], shape (speeds,).
+        mesh_frequencies: mesh frequencies [Hz], shape (speeds,).
         start: displacements [um] and velocities [um/s] at mesh position 0, each of shape (speeds, coordinates).
 
     Returns:
@@ -252,15 +253,15 @@ def _found(oscillator, frequency, start, nodes, periods: int) -> Orbit:
 def settled_orbit(
     oscillator: Oscillator, frequency: Scalar, start: State, nodes: Nodes, settle: int, periods: int
 ) -> Orbit:
-    """`steady_orbit` without checks.
+    """Steady orbit as from `steady_orbit`, without checks of the arguments.
 
-    Where the motion does not settle on an orbit of so many cycles it is those cycles themselves: they have not
-    converged, and their derivatives are those from a fixed state.
+    If the motion does not settle on an orbit of `periods` cycles, the result contains the integrated cycles: they have
+    not converged, and their derivatives hold for a fixed initial state.
     """
     steps = steps_at(oscillator, nodes)
     begin = scaled(_settled(oscillator, frequency, start, nodes, settle), jax.lax.stop_gradient(frequency))
     z = implicit_root(lambda z: moved(oscillator, z, steps, frequency, periods), begin, most=_REFINEMENTS)
-    # not where a state is not a number either
+    # a state of NaN does not count as near
     same = jax.lax.stop_gradient(jnp.linalg.norm(z - begin) <= _SAME * jnp.linalg.norm(z))
     orbit = orbit_at(oscillator, jnp.where(same, z, begin), steps, frequency, periods)
     status = status_of({Status.NO_STEADY_MOTION: ~(orbit.stable & same)}, orbit.status)

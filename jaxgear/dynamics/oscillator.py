@@ -1,4 +1,4 @@
-"""Masses on the line of action with one mesh between them: vector fields for any integrator, and the state of rest."""
+"""Oscillators with one gear mesh: vector fields for any integrator, and static equilibrium."""
 
 from collections.abc import Callable
 from typing import Any, NamedTuple
@@ -45,18 +45,18 @@ class Oscillator(WithStatus, Checked):
         mass x'' + damping x' + stiffness x + direction (F(phase, q) + mesh_damping q') = load
         q = direction . x - e(phase)
 
-    The state y is (x, x'), [um] and [um/s], each of shape (coordinates,); args is the mesh frequency [Hz], or anything
-    that is called with the time and gives (phase, mesh frequency). It runs in `diffrax.ODETerm` as it is.
+    The state y is (x, x'), [um] and [um/s], each of shape (coordinates,); args is the mesh frequency [Hz], or a
+    function of the time that returns (phase, mesh frequency). An oscillator can be used directly in `diffrax.ODETerm`.
 
     Attributes:
-        mesh_force: of the mesh.
-        mass: [kg], shape (coordinates,).
-        direction: what a unit of every coordinate adds to the DTE, shape (coordinates,).
+        mesh_force: mesh force.
+        mass: mass of every coordinate [kg], shape (coordinates,).
+        direction: change of the DTE per unit of every coordinate, shape (coordinates,).
         load: static load on every coordinate [N], shape (coordinates,).
         mesh_damping: viscous damping of the DTE, in contact and out of it [N s/um].
-        stiffness: to ground and between coordinates [N/um], shape (coordinates, coordinates).
-        damping: likewise [N s/um].
-        excitation: None for none.
+        stiffness: stiffness to ground and between coordinates [N/um], shape (coordinates, coordinates).
+        damping: damping to ground and between coordinates [N s/um], shape (coordinates, coordinates).
+        excitation: external excitation; None for none.
         newton: acceleration of a unit mass under a unit force; 1 in dimensionless models.
     """
 
@@ -79,7 +79,7 @@ class Oscillator(WithStatus, Checked):
         return self.rate(self.mesh_force.at(phase), phase, y, frequency)
 
     def rate(self, place: PyTree[Array], phase: Scalar, y: State, mesh_frequency: Scalar) -> State:
-        """Derivative of the state where the place of the mesh force is known already."""
+        """Derivative of the state [um/s], [um/s^2], with the data of the mesh force at a position from `at`."""
         x, v = y
         error, error_rate, extra = self._excited(phase, mesh_frequency)
         dte, speed = self._along(x) - error, self._along(v) - error_rate
@@ -113,7 +113,7 @@ class Oscillator(WithStatus, Checked):
         return self.direction[0] * x[0] if len(x) == 1 else self.direction @ x
 
     def _excited(self, phase, frequency):
-        """Displacement [um], its rate [um/s], and fluctuation of the load relative to it."""
+        """Displacement excitation [um], its rate [um/s], and relative fluctuation of the load."""
         nothing = jnp.zeros_like(phase)
         given = self.excitation
         if given is None:
@@ -132,12 +132,12 @@ _SINGULAR = 10.0
 
 
 class Rest(NamedTuple):
-    """Equilibrium at one mesh position.
+    """Static equilibrium at one mesh position.
 
     Attributes:
-        coordinates: [um], shape (coordinates,).
-        force: of the mesh [N].
-        stiffness: slope of the mesh force there [N/um].
+        coordinates: coordinates [um], shape (coordinates,).
+        force: mesh force [N].
+        stiffness: tangent stiffness of the mesh [N/um].
     """
 
     coordinates: Coordinates
@@ -146,10 +146,10 @@ class Rest(NamedTuple):
 
 
 def at_rest(oscillator: Oscillator, phase: Scalar) -> Rest:
-    """Equilibrium under the mean load at a mesh position [base pitches].
+    """Static equilibrium under the mean load at a mesh position [base pitches].
 
-    Loads that do not balance accelerate the whole; the rest is then that of the DTE. Where springs hold every
-    motion that changes the DTE, they and the mesh share the load, else the mesh carries what the load demands.
+    Unbalanced loads accelerate the system as a whole; the equilibrium then refers to the DTE. If springs support every
+    motion that changes the DTE, springs and mesh share the load; otherwise the mesh carries the full load.
     """
     mesh_force, root_mass = oscillator.mesh_force, jnp.sqrt(oscillator.mass)
     along, load = oscillator.direction / root_mass, oscillator.load / root_mass
@@ -164,7 +164,7 @@ def at_rest(oscillator: Oscillator, phase: Scalar) -> Rest:
         free = along - ground @ (yields @ along)
         is_free = free @ along > _FREE * (along @ along)
         free = jnp.where(is_free, free, 0.0)
-        # the springs as one beside the mesh, without load at the DTE that they alone would take
+        # the springs act as one spring parallel to the mesh, relaxed at the DTE of the springs without mesh
         spring = jnp.where(is_free, 0.0, safe_divide(1.0, along @ yields @ along))
         alone = along @ yields @ load - error
         wanted = jnp.where(is_free, safe_divide(free @ load, free @ along), spring * alone)
@@ -177,9 +177,9 @@ def at_rest(oscillator: Oscillator, phase: Scalar) -> Rest:
 
 @program
 def static_force(oscillator: Oscillator) -> Scalar:
-    """Mesh force [N] under the mean load, averaged over the mesh cycle at rest: that of dynamic factors.
+    """Static mesh force [N] under the mean load, averaged over the mesh cycle; the reference of dynamic factors.
 
-    Every periodic motion has the same mean of the whole mesh force where no spring shares the load with the mesh.
+    It equals the mean mesh force of every periodic motion, unless springs share the load with the mesh.
     """
     if oscillator.stiffness is None:
         along = oscillator.direction / oscillator.mass
@@ -188,7 +188,7 @@ def static_force(oscillator: Oscillator) -> Scalar:
 
 
 class _BesideSpring(AbstractMeshForce):
-    """A mesh and a spring [N/um] that the same DTE deflects."""
+    """Mesh with a parallel spring [N/um]."""
 
     mesh: AbstractMeshForce
     spring: Scalar = number("N/um")
@@ -206,11 +206,11 @@ def _with_slope(mesh_force: AbstractMeshForce, phase: Scalar, dte: Scalar) -> tu
 
 
 class Natural(NamedTuple):
-    """Natural frequencies [Hz] with the mean stiffness of the mesh.
+    """Natural frequencies with the mean stiffness of the mesh.
 
     Attributes:
-        mesh: of the DTE alone, all coordinates free.
-        highest: of all coordinates.
+        mesh: natural frequency of the DTE, without springs to ground and between coordinates [Hz].
+        highest: highest natural frequency of all coordinates [Hz].
     """
 
     mesh: Scalar

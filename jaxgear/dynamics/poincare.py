@@ -1,4 +1,5 @@
-"""The map of a state over some mesh cycles, in scaled unknowns, and one point of a branch of its fixed points."""
+"""Poincare map of a state over mesh cycles, in scaled unknowns, and correction of a point on a branch of fixed points.
+"""
 
 from collections.abc import Callable, Sequence
 from typing import NamedTuple, TypeVar
@@ -20,18 +21,18 @@ STEPS = 200  # of a mesh cycle: Runge-Kutta steps of order four keep K_v to 0.1 
 
 
 def scaled(y: State, mesh_frequency: Scalar) -> Unknowns:
-    """A state as unknowns of like size."""
+    """Unknowns of a state: displacements and velocities / (2 pi mesh frequency), all in um."""
     return jnp.concatenate([y[0], y[1] / (2 * jnp.pi * mesh_frequency)])
 
 
 def unscaled(z: Unknowns, mesh_frequency: Scalar) -> State:
-    """The state of unknowns."""
+    """State from its unknowns: displacements [um] and velocities [um/s]."""
     x, v = jnp.split(z, 2)
     return x, v * (2 * jnp.pi * mesh_frequency)
 
 
 def after(oscillator: Oscillator, y: State, steps: Steps, mesh_frequency: Scalar, count: int) -> State:
-    """State after some cycles, of which nothing is recorded."""
+    """State after `count` mesh cycles, without a record."""
 
     def step(y, step):
         return one_step(oscillator, y, step, mesh_frequency), None
@@ -95,7 +96,7 @@ def nodes_of(steps: Numbers) -> Nodes:
 
 
 def steps_at(oscillator: Oscillator, nodes: Nodes) -> Steps:
-    """Steps between nodes of a mesh cycle, or so many as the mesh force lays them out."""
+    """Steps between given nodes of a mesh cycle, or a number of steps placed by the mesh force."""
     if isinstance(nodes, int):
         nodes = oscillator.mesh_force.nodes(nodes)
     return steps_of(oscillator, nodes.astype(oscillator.mass.dtype))
@@ -108,7 +109,7 @@ _MOST = 10  # evaluations of a corrector: where it takes more, the step along th
 
 
 class OverSpeed(eqx.Module):
-    """The family of orbits of one oscillator over the mesh frequency [Hz]."""
+    """Family of orbits of one oscillator with the mesh frequency [Hz] as parameter."""
 
     oscillator: Oscillator
 
@@ -128,11 +129,11 @@ class Scales(NamedTuple):
     parameter: Scalar
 
     def unknowns(self, place: Place) -> tuple[Array, Scalar]:
-        """The unknowns of an orbit and the parameter at a place."""
+        """Unknowns of an orbit [um] and parameter at a place."""
         return place[:-1] * self.size, place[-1] * self.parameter
 
     def place(self, z: Array, parameter: Scalar) -> Place:
-        """The place of an orbit."""
+        """Place of an orbit: its unknowns and the parameter, each divided by its scale."""
         return jnp.append(z / self.size, parameter / self.parameter)
 
 
@@ -143,8 +144,8 @@ class Corrected(NamedTuple):
         place: unknowns and parameter of the point, divided by their scales.
         tangent: unit tangent of the branch; its last component is along the parameter.
         monodromy: derivative of the state after the orbit by the state before, in the unknowns of the place.
-        evaluations: of the Poincare map.
-        converged: whether there is an orbit.
+        evaluations: number of evaluations of the Poincare map.
+        converged: True if an orbit was found.
     """
 
     place: Place
@@ -155,10 +156,10 @@ class Corrected(NamedTuple):
 
 
 def family_of(oscillator: Oscillator | Family) -> Family:
-    """The family that an oscillator stands for, that over the mesh frequency, or the given one.
+    """Family of orbits of an oscillator over the mesh frequency; a function of a parameter is returned unchanged.
 
     Raises:
-        TypeError: for what is neither an `Oscillator` nor a function of a parameter.
+        TypeError: if the argument is neither an `Oscillator` nor a function of a parameter.
     """
     if isinstance(oscillator, Oscillator):
         return OverSpeed(oscillator)
@@ -176,7 +177,7 @@ def change(family: Family, place: Place, scales: Scales, nodes: Nodes, periods: 
 
 
 def corrected(family: Family, guess: Place, normal: Place, scales: Scales, nodes: Nodes, periods: int) -> Corrected:
-    """The point of a branch on the plane through a guess across a normal, along which the tangent points."""
+    """Point of a branch on the plane through a guess with a given normal; its tangent points along the normal."""
 
     def equations(place):
         across = jnp.sum(normal * (place - guess))
@@ -190,11 +191,11 @@ def corrected(family: Family, guess: Place, normal: Place, scales: Scales, nodes
 
 
 def first_direction(size: int, dtype: np.dtype, sign: float) -> Place:
-    """The direction in which only the parameter changes."""
+    """Unit direction of the parameter, with a sign, shape (size,)."""
     return jnp.zeros(size, dtype).at[-1].set(sign)
 
 
 def held(tree: _Tree) -> _Tree:
-    """A tree whose arrays pass no derivative."""
+    """Tree with stopped gradients of all its arrays."""
     arrays, rest = eqx.partition(tree, eqx.is_array)
     return eqx.combine(jax.lax.stop_gradient(arrays), rest)

@@ -1,7 +1,7 @@
-"""Numbers of steady vibration as quantities: objectives, limits, columns of sweeps.
+"""Results of steady vibration as quantities: objectives, limits, columns of sweeps.
 
-A name alone does not say at which speeds, with which masses and damping: `Dynamics.quantity` gives the quantity, and a
-design file has the table [dynamics].
+A quantity of dynamics needs speeds, masses and damping besides its name: `Dynamics.quantity` supplies them in Python,
+the table [dynamics] in a design file.
 """
 
 from collections.abc import Iterator
@@ -29,7 +29,7 @@ AT_SPEED = tuple(name for name, *_ in _FIELDS)  # at the speed of the operating 
 
 
 def _numbers(field: str, at_speed: bool, analysis: Analysis, dynamics: Dynamics) -> Numbers:
-    """The numbers of a design, whose worst counts."""
+    """Values of a quantity for all runs and speeds, which the quantity reduces to the worst."""
     # all quantities of the same settings come from one sweep
     found, converged = analysis.once(dynamics, ("runs", at_speed), lambda: _swept(at_speed, analysis, dynamics))
     # a map of contacts that were not found is no force

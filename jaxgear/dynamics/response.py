@@ -1,4 +1,4 @@
-"""Results of a recorded orbit of an oscillator: dynamic factor, vibration, spectra, shares of contact."""
+"""Results of a recorded orbit: dynamic factor, DTE, spectra, contact-loss share."""
 
 from typing import Literal, NamedTuple
 
@@ -26,22 +26,21 @@ class SpeedResponse(WithStatus, Checked):
         mesh_frequency: [Hz], increasing, shape (speeds,).
         dynamic_factor: largest elastic mesh force of the orbit over the static force (K_v), shape (speeds,).
         dte_rms: rms of the dynamic transmission error (DTE) about its mean [um], shape (speeds,).
-        dte_mean, dte_min, dte_max: [um], shape (speeds,).
+        dte_mean, dte_min, dte_max: mean and extremes of the DTE [um], shape (speeds,).
         force_harmonics: amplitudes of the elastic mesh force at the orders [N], shape (speeds, orders); 0 at orders
-            that the orbit cannot have.
+            that do not occur with the period of the orbit.
         velocity_harmonics: amplitudes of the rate of the DTE [um/s], shape (speeds, orders).
         contact_loss_share: share of the time without contact, shape (speeds,).
         back_side_contact: share of the time with contact of the coast flanks, shape (speeds,).
-        period: mesh cycles after which the orbit repeats, 0 where it does not within the largest number tried, shape
-            (speeds,).
-        poincare_dte, poincare_velocity: DTE [um] and its rate [um/s] at mesh position 0 of successive cycles,
-            shape (speeds, points); they repeat where the orbit does.
-        status: `converged` where a steady state was reached, of a mesh force whose contacts were found, shape
-            (speeds,); elsewhere the numbers are of a motion that is aperiodic, or still on its way, or of no such
-            force.
+        period: number of mesh cycles after which the orbit repeats, shape (speeds,); 0 if it does not repeat within the
+            largest number tried.
+        poincare_dte, poincare_velocity: DTE [um] and its rate [um/s] at mesh position 0 of successive cycles, shape
+            (speeds, points); they repeat with the period of the orbit.
+        status: `converged` if a steady state was reached and all contacts of the mesh force have converged, shape
+            (speeds,); otherwise the values belong to an aperiodic or unsettled motion, or to an invalid mesh force.
         state: coordinates [um] and velocities [um/s] at mesh position 0, each of shape (speeds, coordinates).
         orders: multiples of the mesh frequency of the harmonics.
-        direction: in which the speeds were gone through.
+        direction: order in which the speeds were computed, "up" or "down".
     """
 
     mesh_frequency: Float[Array, "*batch speeds"] = result("Hz")
@@ -69,12 +68,13 @@ class SpeedResponse(WithStatus, Checked):
 
 
 class Sums(NamedTuple):
-    """Extremes and integrals over the mesh position, of the steps of an orbit so far.
+    """Extremes and integrals over the mesh position, accumulated over the steps of an orbit.
 
     Attributes:
         peak: largest elastic mesh force [N].
         lowest, highest: extremes of the DTE [um].
-        mean, square: integrals of the DTE less its value at the start, and of the square of that [um, um^2].
+        mean, square: integrals of the DTE minus its value at the start, and of the square of this difference [um,
+            um^2].
         apart, coast: time without contact and with contact of the coast flanks [cycles].
         force, dte: complex Fourier integrals, shape (orders,).
     """
@@ -98,7 +98,7 @@ def no_sums(orders: Float[Array, " orders"]) -> Sums:
 
 
 def waves_of(orders: Float[Array, " orders"], phase: Float[Array, " nodes"]) -> Float[Array, "nodes waves"]:
-    """Cosines and negative sines of the orders at mesh positions [base pitches]; of the cycle alone."""
+    """Cosines and negative sines of the orders at mesh positions of one cycle [base pitches], shape (nodes, waves)."""
     turn = 2 * jnp.pi * phase[:, None] * orders[None]
     return jnp.concatenate([jnp.cos(turn), -jnp.sin(turn)], axis=1)
 
@@ -113,16 +113,16 @@ def with_step(
     waves: Float[Array, "3 waves"],
     origin: Scalar,
 ) -> tuple[State, Sums]:
-    """The state after one more step, and the sums with it.
+    """Advance state and sums by one step.
 
     Args:
-        sums: of the steps before.
-        oscillator: what vibrates.
-        y: state at the begin of the step.
-        step: one.
-        mesh_frequency: [Hz].
-        waves: as `waves_of` gives them at the begin, in the middle and at the end of the step.
-        origin: DTE from which mean and square are taken [um].
+        sums: sums of the previous steps.
+        oscillator: the oscillator.
+        y: state at the start of the step.
+        step: the step.
+        mesh_frequency: mesh frequency [Hz].
+        waves: waves from `waves_of` at the start, in the middle and at the end of the step.
+        origin: DTE that is subtracted for mean and square [um].
     """
     end = one_step(oscillator, y, step, mesh_frequency)
     begin = jax.tree.map(lambda part: part[None, None], y)
@@ -132,7 +132,7 @@ def with_step(
     def integral(values):
         return step.length * mean(of, values)
 
-    # a product of matrices, so that no compiler works the force out once more for every order
+    # a product of matrices, so that the compiler does not evaluate the force again for every order
     weights = step.length * jnp.asarray(SIMPSON, off.dtype)
     spectra = (weights[None] * jnp.stack([of.force[:, 0], of.dte[:, 0]])) @ waves
     force, dte = jax.lax.complex(*jnp.split(spectra, 2, axis=1))
@@ -151,12 +151,12 @@ def with_step(
 
 
 def with_cycle(before: Sums, of_cycle: Sums, cycle: Int[Array, ""], orders: Float[Array, " orders"]) -> Sums:
-    """The sums with one more cycle, the spectra turned by the cycles that came before.
+    """Add a cycle to the sums; its spectra are rotated by the phase of the previous cycles.
 
     Args:
-        before: of all cycles before.
-        of_cycle: of the cycle with the sums before, but for the spectra, which are of the cycle alone.
-        cycle: how many came before.
+        before: sums of all previous cycles.
+        of_cycle: sums including the new cycle, except for the spectra, which contain the new cycle only.
+        cycle: number of previous cycles.
         orders: multiples of the mesh frequency.
     """
     angle = 2 * jnp.pi * orders * cycle.astype(orders.dtype)
@@ -166,7 +166,7 @@ def with_cycle(before: Sums, of_cycle: Sums, cycle: Int[Array, ""], orders: Floa
 
 
 class Numbers(NamedTuple):
-    """Results of a whole orbit from its sums; names and units of `SpeedResponse`."""
+    """Results of an orbit; names and units as in `SpeedResponse`."""
 
     dynamic_factor: Scalar
     dte_rms: Scalar
@@ -188,15 +188,15 @@ def numbers_of(
     origin: Scalar,
     static_force: Scalar,
 ) -> Numbers:
-    """Numbers of an orbit from the sums over its cycles.
+    """Results of an orbit from the sums over its cycles.
 
     Args:
-        sums: over so many cycles.
-        mesh_frequency: [Hz].
-        cycles: their number.
-        orders: multiples of the mesh frequency.
-        origin: as in `with_step` [um].
-        static_force: [N].
+        sums: sums over all cycles.
+        mesh_frequency: mesh frequency [Hz].
+        cycles: number of cycles.
+        orders: multiples of the mesh frequency, shape (orders,).
+        origin: DTE that was subtracted for mean and square [um].
+        static_force: static mesh force [N].
     """
     mean = sums.mean / cycles
     whole = jnp.abs(orders * cycles - jnp.round(orders * cycles)) < _ROUNDING

@@ -1,4 +1,4 @@
-"""The force of a mesh over whole revolutions of gears whose teeth differ."""
+"""Mesh force over whole revolutions of gears with deviations of single teeth."""
 
 from typing import Literal, get_args
 
@@ -19,13 +19,13 @@ _FAR = 1e6
 
 
 class RevolutionForce(WithStatus, AbstractMeshForce):
-    """Force of a mesh whose phase counts revolutions: 1 is when all windows of a `Revolution` have passed.
+    """Mesh force over the windows of a `Revolution`; its phase is 1 after all windows.
 
-    Oscillators with it therefore take the mesh frequency over `base_pitches`, and as many times the steps of a mesh
-    cycle; their orbits repeat after the windows, and `shaft_orders` takes the DTE of an orbit of even steps.
+    Oscillators with this force need the mesh frequency divided by `base_pitches`, and the steps of a mesh cycle
+    multiplied by it. Their orbits repeat after all windows; `shaft_orders` takes the DTE of an orbit of even steps.
 
     Attributes:
-        springs: force over the mesh positions of all windows.
+        springs: mesh force over the mesh positions of all windows.
         base_pitches: number of windows.
     """
 
@@ -39,7 +39,7 @@ class RevolutionForce(WithStatus, AbstractMeshForce):
 
     @property
     def averaged_positions(self) -> int:
-        """Mesh positions over which stiffnesses are averaged: in every window as many as in one base pitch."""
+        """Number of mesh positions over which stiffnesses are averaged, `POSITIONS` for every window."""
         return POSITIONS * self.base_pitches
 
     def at(self, phase: Scalar) -> PyTree[Array]:
@@ -51,7 +51,7 @@ class RevolutionForce(WithStatus, AbstractMeshForce):
 
 
 def revolution_force(revolution: Revolution, model: RevolutionModel = "varying stiffness") -> RevolutionForce:
-    """Force of a mesh over the windows of a revolution, for oscillators.
+    """Mesh force over the windows of a revolution, for oscillators.
 
         force = revolution_force(turn)
         oscillator = torsional(force, mesh.pair, torque, damping_ratio=0.05)
@@ -60,11 +60,11 @@ def revolution_force(revolution: Revolution, model: RevolutionModel = "varying s
         shaft_orders(turn, "pinion", of=orbit.dte)
 
     Args:
-        revolution: a single one, whose windows repeat.
-        model: as of `mesh_force`; where flanks part, nothing is behind them: coast flanks are left out.
+        revolution: a single revolution, not a batch, with periodic windows.
+        model: model as for `mesh_force`; coast flanks are not modelled.
 
     Raises:
-        ValueError: for another model, or a revolution after which the teeth do not meet as before.
+        ValueError: for another model, or for windows after which the same teeth do not meet again.
     """
     if model not in get_args(RevolutionModel):
         raise ValueError(f'model = {model!r} must be "varying stiffness" or "tangent"')

@@ -1,4 +1,4 @@
-"""Several runs through the same speeds in one program, of one oscillator or of many designs, on all devices."""
+"""Several runs through the same speeds in one program, for one oscillator or many designs, on all devices."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -20,7 +20,7 @@ _SIDE_BY_SIDE, _SIDE_BY_SIDE_ELSEWHERE = 32, 4096
 
 
 def side_by_side(batch: int | None) -> int:
-    """Oscillators that advance side by side on a device; None for as many as suit it."""
+    """Number of oscillators per batch on a device; None for the default of the device."""
     elsewhere = jax.local_devices()[0].platform != "cpu"
     return whole("batch", (_SIDE_BY_SIDE_ELSEWHERE if elsewhere else _SIDE_BY_SIDE) if batch is None else batch)
 
@@ -34,7 +34,7 @@ _MADE_TOGETHER, _MADE_TOGETHER_ELSEWHERE = 4, 64
 
 
 class Run(NamedTuple):
-    """One way through the speeds; options of `speed_sweep`."""
+    """Options of `speed_sweep` for one run through the speeds."""
 
     direction: Direction = "up"
     kick: Any = None
@@ -48,13 +48,13 @@ def with_like_kicks(runs: Mapping[str, Run]) -> dict[str, Run]:
 
 
 def speed_runs(oscillator: Oscillator, mesh_frequencies: Numbers, runs: Mapping[str, Run], **options: Any) -> Responses:
-    """`speed_sweep` of one oscillator for each of some runs, one after the other in one program.
+    """Speed sweeps of one oscillator for several runs, in sequence in one program.
 
     Args:
-        oscillator: one.
-        mesh_frequencies: [Hz], increasing, shape (speeds,).
-        runs: by name.
-        options: the others of `speed_sweep` but for `start`.
+        oscillator: a single oscillator.
+        mesh_frequencies: increasing mesh frequencies [Hz], shape (speeds,).
+        runs: options of every run, by name.
+        options: further options of `speed_sweep`, except `start`.
 
     Raises:
         ValueError: as `speed_sweep`.
@@ -77,23 +77,24 @@ def design_runs(
     batch: int | None = None,
     **options: Any,
 ) -> Any:
-    """`speed_runs` of many designs, whose oscillators are made batch by batch.
+    """Speed sweeps of many designs for several runs; oscillators are made batch by batch.
 
-    What is in memory besides what is kept does not grow with the number of designs.
+    Apart from the returned values, the memory does not grow with the number of designs.
 
     Args:
-        make: oscillator of one design; traced. The program is compiled once for one function.
-        designs: array or tree of arrays with a leading axis.
-        mesh_frequencies: [Hz], increasing, shape (speeds,), the same for all.
-        runs: by name.
-        keep: what is kept of the responses of one design, a tree of arrays; traced. None for all of them.
-        batch: designs that advance side by side on a device; None for as many as suit the device.
-        options: the others of `speed_sweep` but for `start`; `steps` have to be given, as `steps_for` of the stiffest
-            design gives them.
+        make: function that returns the oscillator of one design; traced. The program is compiled once per function.
+        designs: array or tree of arrays with a leading axis (designs,).
+        mesh_frequencies: increasing mesh frequencies [Hz], shape (speeds,), the same for all designs.
+        runs: options of every run, by name.
+        keep: function of the responses of one design that returns the values to keep, a tree of arrays; traced. None to
+            keep the responses.
+        batch: number of designs per batch on a device; None for the default of the device.
+        options: further options of `speed_sweep`, except `start`; `steps` are required, for instance by `steps_for` of
+            the stiffest design.
 
     Returns:
-        what is kept, with the axis of the designs in front. Of a design whose contacts were not found floating-point
-        numbers are nan, and every speed has its status.
+        the kept values with a leading axis (designs,). For a design whose contacts have not converged, floating-point
+        values are NaN, and every speed has the status of the contacts.
 
     Raises:
         ValueError: as `speed_sweep`, without `steps`, and for designs without a common leading axis.
@@ -107,7 +108,7 @@ def design_runs(
 def _in_batches(
     make, designs: Any, frequencies, runs: Mapping[str, Run], *, keep=None, batch: int | None, **options
 ) -> Any:
-    """`design_runs` under checked frequencies."""
+    """Runs of many designs as from `design_runs`, with checked frequencies."""
     lengths = {jnp.shape(part)[:1] for part in jax.tree.leaves(designs)}
     if len(lengths) != 1 or not all(lengths) or lengths == {(0,)}:
         raise ValueError("designs must be arrays with one leading axis, the same and not 0 for all")
@@ -128,19 +129,19 @@ def _in_batches(
 def speed_sweeps(
     oscillators: Oscillator, mesh_frequencies: Numbers, *, batch: int | None = None, **options: Any
 ) -> SpeedResponse:
-    """`speed_sweep` of many oscillators: designs, torques, or both.
+    """Speed sweeps of many oscillators: designs, torques, or both.
 
-    What is in memory besides the results does not grow with their number.
+    Apart from the results, the memory does not grow with the number of oscillators.
 
     Args:
-        oscillators: with one axis in front of every array, as `jax.vmap` of what makes one gives them.
-        mesh_frequencies: [Hz], increasing, shape (speeds,), the same for all.
-        batch: oscillators that advance side by side on a device; None for as many as suit the device.
-        options: the others of `speed_sweep`, the same for all; but for `start`, each begins at its static equilibrium.
+        oscillators: oscillators with a leading axis on every array, for instance made with `jax.vmap`.
+        mesh_frequencies: increasing mesh frequencies [Hz], shape (speeds,), the same for all.
+        batch: number of oscillators per batch on a device; None for the default of the device.
+        options: further options of `speed_sweep`, the same for all, except `start`: all start at static equilibrium.
 
     Returns:
-        a `SpeedResponse` whose arrays have the axis of the oscillators in front; of an oscillator whose contacts were
-        not found as `design_runs`.
+        a `SpeedResponse` with a leading axis (oscillators,) on every array. For an oscillator whose contacts have not
+        converged, floating-point values are NaN, and every speed has the status of the contacts.
 
     Raises:
         ValueError: in one line for a single oscillator, and as `speed_sweep`.
@@ -200,7 +201,7 @@ def _of_designs(rows, shared, make, keep, ways: _Ways, sizes, devices):
 
 
 def _or_nothing(converged: Bool[Array, ""], part: Array) -> Array:
-    """The array where the mesh force converged, else NaN (0 for integers)."""
+    """Array if the mesh force has converged, else NaN (0 for integers)."""
     nothing = jnp.nan if jnp.issubdtype(part.dtype, jnp.floating) else 0
     return jnp.where(converged, part, jnp.full((), nothing, part.dtype))
 
@@ -210,7 +211,7 @@ def _ways(runs: Mapping[str, Run]) -> _Ways:
 
 
 def _named(found: SpeedResponse, ways: _Ways, axis: int = 0) -> Responses:
-    """Responses by the names of their runs, which have an axis of their own."""
+    """Split responses along the axis of the runs; returns them by the name of the run."""
     each = _along(found, axis)
     return {name: replace(one, direction=direction) for one, (name, direction) in zip(each, ways, strict=True)}
 

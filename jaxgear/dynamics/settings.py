@@ -1,4 +1,4 @@
-"""How a mesh is run through its speeds: what vibrates, at which speeds, and the quantities that are made of it."""
+"""Settings of dynamics: speeds, masses, damping; and the quantities of steady vibration."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -40,36 +40,38 @@ _STEPS = 256
 
 
 class Dynamics(AbstractSettings):
-    """How a mesh is run: masses, damping and speeds.
+    """Settings of dynamics: speeds, masses and damping.
 
-    `quantity` gives with it the numbers of the vibration, `DYNAMIC_QUANTITIES`: "dynamic_factor", "dte_rms",
+    `quantity` returns the quantities of the vibration, `DYNAMIC_QUANTITIES`: "dynamic_factor", "dte_rms",
     "contact_loss_share" or "back_side_contact" at the speed of the operating point, the worse of the motions from rest
-    and from a kick; with "worst_" before it, the worst of all runs and speeds. The first two are differentiable where
-    the steady state is an orbit of up to four mesh cycles; elsewhere their derivative is zero.
+    and from a kick; with the prefix "worst_" the worst of all runs and speeds. The first two are differentiable if the
+    steady state is an orbit of up to four mesh cycles; otherwise their derivative is zero.
 
     Attributes:
-        mesh_frequencies: [Hz], increasing, shape (speeds,).
-        damping_ratio: of the DTE, to the critical damping at the mean stiffness; 0.05 without it or `damping`.
+        mesh_frequencies: increasing mesh frequencies, shape (speeds,).
+        damping_ratio: damping ratio of the DTE, relative to the critical damping at the mean stiffness; default 0.05 if
+            `damping` is not given either.
         damping: viscous damping of the DTE, in place of the ratio.
-        pinion_inertia: polar moment of inertia of the pinion and the parts that turn with it; that of the body without
-            it.
-        wheel_inertia: the same of the wheel.
-        compliance: of the parts between the teeth and the inertias, in series with the mesh.
-        pinion_bearing: stiffness of the support of the pinion along and across the line of action, and with a third
-            number along the axis, in which it is rigid without; rigid without any of them. The supports of both gears
-            are given in as many directions, or of none.
-        wheel_bearing: the same of the wheel.
-        pinion_bearing_damping: viscous damping of the support of the pinion in the directions of its stiffness; none
-            without it.
-        wheel_bearing_damping: the same of the wheel.
-        model: of the mesh force.
-        positions: mesh positions of the force, which is linear between them.
+        pinion_inertia: polar moment of inertia of the pinion and the parts that turn with it; by default that of the
+            gear body.
+        wheel_inertia: polar moment of inertia of the wheel and the parts that turn with it; by default that of the gear
+            body.
+        compliance: compliance of the parts between the teeth and the inertias, in series with the mesh.
+        pinion_bearing: stiffness of the support of the pinion along and across the line of action, optionally with a
+            third value along the axis (rigid by default); rigid if not given. Both gears need the same number of
+            directions.
+        wheel_bearing: stiffness of the support of the wheel, as for `pinion_bearing`.
+        pinion_bearing_damping: viscous damping of the support of the pinion in the directions of its stiffness; zero by
+            default.
+        wheel_bearing_damping: viscous damping of the support of the wheel, as for `pinion_bearing_damping`.
+        model: model of the mesh force.
+        positions: number of mesh positions of the force, which is linear between them.
         kick: dynamic factor at the start of a second run from the highest speed down, in place of `kicks`; 1 for no
             second run.
-        steps: integrator steps per mesh cycle; chosen by the natural frequency without it.
-        kicks: dynamic factors of the starts with separated flanks that a second run down tries at every speed, to find
-            orbits that are not connected with others; it continues with the strongest. 2.5, 3 and 3.7 without it or
-            `kick`.
+        steps: integrator steps per mesh cycle; by default chosen by the natural frequency.
+        kicks: dynamic factors of starts with separated flanks, tried at every speed of a second run down to find orbits
+            that are not connected with others; the run continues with the orbit of the largest dynamic factor. Default
+            2.5, 3 and 3.7 if `kick` is not given either.
     """
 
     table = "dynamics"
@@ -123,7 +125,8 @@ class Dynamics(AbstractSettings):
         pinion: AbstractModification | None = None,
         wheel: AbstractModification | None = None,
     ) -> Oscillator:
-        """Oscillator of the dynamic transmission error, and on bearings of the centres of both gears.
+        """Oscillator with the dynamic transmission error as coordinate, and with the gear centres if bearings are
+        given.
 
         Args:
             mesh: prepared mesh.
@@ -140,13 +143,13 @@ class Dynamics(AbstractSettings):
         return self.oscillator_and_mesh(mesh, torque, **flanks)[0]
 
     def oscillator_and_mesh(self, mesh: Mesh, torque: Given, **flanks: Any) -> tuple[Oscillator, Mesh]:
-        """`oscillator`, of coast flanks and manufacturing deviations too, and the mesh of its mesh force."""
+        """Oscillator with optional coast flanks and manufacturing deviations, and the mesh of its mesh force."""
         options: dict[str, Any] = {"model": self.model, "compliance": self.compliance, "positions": self.positions}
         force, mesh = force_and_mesh(mesh, torque=torque, **options, **flanks)
         return self.masses(force, mesh.pair, torque), mesh
 
     def masses(self, force: AbstractMeshForce, pair: GearPair, torque: Given) -> Oscillator:
-        """The oscillator of any mesh force between the gears of a pair under a torque on the pinion [N m]."""
+        """Oscillator of a pair with any mesh force, under a torque on the pinion [N m]."""
         given = (pair.pinion, self.pinion_inertia), (pair.wheel, self.wheel_inertia)
         inertias = tuple(inertia_of(gear) if inertia is None else inertia for gear, inertia in given)
         ratio = DAMPING_RATIO if self.damping_ratio is None and self.damping is None else self.damping_ratio
@@ -170,12 +173,12 @@ class Dynamics(AbstractSettings):
         return UP, *falling, *((KICKED,) if self.kick is None or self.kick > 1 else ())
 
     def run(self, oscillator: Oscillator, name: str, *, steps: Sequence[int] | int | None = None) -> SpeedResponse:
-        """The steady states of one of the runs.
+        """Steady states of one run through the speeds.
 
         Args:
-            oscillator: what vibrates.
-            name: one of `run_names`.
-            steps: of the integrator per mesh cycle, in place of `steps`; one number or one for each speed.
+            oscillator: the oscillator.
+            name: name of the run, one of `run_names`.
+            steps: steps of the integrator per mesh cycle, one number or one for each speed; None for the field `steps`.
         """
         steps = self.steps if steps is None else steps
         run = with_like_kicks(self._runs)[name]  # so that one program does all of them
@@ -192,7 +195,7 @@ class Dynamics(AbstractSettings):
         return self._runs[name].kicks
 
     def runs(self, oscillator: Oscillator) -> dict[str, SpeedResponse]:
-        """The steady states of all runs."""
+        """Steady states of all runs, by the name of the run."""
         return speed_runs(oscillator, self.mesh_frequencies, self._runs, steps=self.steps)
 
     def runs_of(
@@ -204,10 +207,10 @@ class Dynamics(AbstractSettings):
         keep: Callable[[dict[str, SpeedResponse]], Any] | None = None,
         batch: int | None = None,
     ) -> Any:
-        """The steady states of all runs of many designs, at many torques as well, in one program.
+        """Steady states of all runs of many designs and torques, in one program.
 
-        Mesh forces are made batch by batch, so that what is in memory besides what is kept does not grow with the
-        number of designs:
+        Mesh forces are made batch by batch: apart from the returned values, the memory does not grow with the number
+        of designs:
 
             def make(design):
                 relief = TipRelief(design["amount"], design["length"])
@@ -216,16 +219,17 @@ class Dynamics(AbstractSettings):
             worst = settings.runs_of(make, designs, keep=lambda runs: jnp.max(runs["up"].dynamic_factor))
 
         Args:
-            make: oscillator of one design; traced. The program is compiled once for one function.
-            designs: array or tree of arrays with a leading axis.
-            steps: of the integrator per mesh cycle, one number or one for each speed, as `steps_for` of the stiffest
-                design gives them; None for `steps`, or 256.
-            keep: what is kept of the runs of one design, a tree of arrays; traced. None for all of them.
-            batch: designs that advance side by side on a device; None for as many as suit the device.
+            make: function that returns the oscillator of one design; traced. The program is compiled once per function.
+            designs: array or tree of arrays with a leading axis (designs,).
+            steps: steps of the integrator per mesh cycle, one number or one for each speed, for instance by `steps_for`
+                of the stiffest design; None for the field `steps`, or 256.
+            keep: function of the runs of one design that returns the values to keep, a tree of arrays; traced. None to
+                keep all responses.
+            batch: number of designs per batch on a device; None for the default of the device.
 
         Returns:
-            what is kept, with the axis of the designs in front. Of a design whose contacts were not found numbers are
-            nan, and no speed is settled.
+            the kept values with a leading axis (designs,). For a design whose contacts have not converged, values are
+            NaN, and no speed has converged.
 
         Raises:
             ValueError: for designs without a common leading axis, and steps out of their range.
@@ -236,28 +240,28 @@ class Dynamics(AbstractSettings):
 
     @property
     def traced_steps(self) -> int:
-        """Steps of the integrator per mesh cycle where the natural frequency is being traced."""
+        """Steps of the integrator per mesh cycle for a traced oscillator: the field `steps`, or 256."""
         return _STEPS if self.steps is None else self.steps
 
     def force(
         self, oscillator: Oscillator, mesh_frequency: Scalar, phase: Float[Array, " positions"], steps: int
     ) -> SteadyForce:
-        """Mesh force of the steady motion from rest at a mesh frequency [Hz], whatever the speeds of the settings.
+        """Mesh force of the steady motion from rest at a mesh frequency [Hz]; the speeds of the settings are not used.
 
         Args:
-            oscillator: what vibrates; derivatives pass through it and the frequency.
-            mesh_frequency: [Hz].
-            phase: mesh positions at which the force is asked for [base pitches], shape (positions,).
-            steps: of the integrator per mesh cycle.
+            oscillator: the oscillator; derivatives pass through it and the frequency.
+            mesh_frequency: mesh frequency [Hz].
+            phase: mesh positions of the returned force [base pitches], shape (positions,).
+            steps: steps of the integrator per mesh cycle.
         """
         held, frequency = jax.lax.stop_gradient((oscillator, mesh_frequency))
         alone = replace(self, mesh_frequencies=frequency[None], steps=steps)
         return steady_force(oscillator, mesh_frequency, alone.run(held, UP), phase, steps)
 
     def numbers(self, oscillator: Oscillator) -> SteadyNumbers:
-        """The numbers of all runs with their derivatives, leading axis (runs,).
+        """Results of all runs with their derivatives, leading axis (runs,).
 
-        The steps of the integrator are `steps`, or 256: nothing else is known of what is being traced.
+        The integrator uses the field `steps`, or 256: the natural frequency of a traced oscillator is unknown.
         """
         steps = self.traced_steps
         runs = replace(self, steps=steps).runs(jax.lax.stop_gradient(oscillator))

@@ -1,4 +1,4 @@
-"""Mesh cycles until the motion at one speed repeats, from where it starts to its record."""
+"""Integration at one speed until the motion repeats, and the record of its orbit."""
 
 from collections.abc import Callable
 from typing import Any, NamedTuple, TypeVar
@@ -27,7 +27,7 @@ _DIFFERENCES = 3  # that determine the map of two unknowns
 
 
 class Speed(NamedTuple):
-    """A mesh frequency [Hz], and the steps of its cycles."""
+    """Mesh frequency [Hz] and the steps of a mesh cycle at this speed."""
 
     frequency: Scalar
     cycle: Cycle
@@ -46,7 +46,7 @@ class Speed(NamedTuple):
 
 
 class _Settling(NamedTuple):
-    """Motion so far, on the way to a periodic orbit.
+    """State of the integration towards a periodic orbit.
 
     Attributes:
         cycle: number of mesh cycles.
@@ -64,13 +64,13 @@ class _Settling(NamedTuple):
 def settled(
     oscillator: Oscillator, y: State, speed: Speed, tolerance: Scalar, most_cycles: Int[Array, ""], most_periods: int
 ) -> tuple[State, Int[Array, ""]]:
-    """State after as many cycles as it takes, and the cycles of its orbit, 0 where none was found.
+    """Integrate until the motion repeats; returns the state and the mesh cycles of its orbit, 0 if none was found.
 
-    Once the motion is near an orbit the differences u of successive states follow u_n = a u_(n-1) + b u_(n-2), where
-    the orbit's map has two multipliers, those of one coordinate; others have faded or do not matter. Two differences
-    and the last one give a and b, and the sum of those to come leads to the orbit (minimal polynomial extrapolation:
-    S. Cabay, L. W. Jackson, SIAM J. Numer. Anal. 13 (1976) 734-752). It is used where the multipliers are those of a
-    stable orbit, on which the motion would have settled as well, and near enough to be in the same basin.
+    Near an orbit the differences u of successive states follow u_n = a u_(n-1) + b u_(n-2), with the two dominant
+    multipliers of the map of the orbit; other components have decayed. Three differences give a and b, and the sum of
+    all further differences leads to the orbit (minimal polynomial extrapolation: S. Cabay, L. W. Jackson, SIAM J.
+    Numer. Anal. 13 (1976) 734-752). The extrapolation is used if the multipliers belong to a stable orbit, on which the
+    motion would settle as well, and if the orbit is near enough to lie in the same basin of attraction.
     """
     scale = jnp.concatenate([jnp.ones_like(y[0]), jnp.full_like(y[1], 1 / (2 * jnp.pi) / speed.frequency)])
 
@@ -117,7 +117,7 @@ def _seen(oscillator: Oscillator, past: Float[Array, "states unknowns"]) -> Arra
 
 
 def _foreseen(past, seen, near: Bool[Array, " periods"], fresh) -> tuple[Unknowns, Scalar]:
-    """State on which the motion will settle, and how far it is from the last one [um], inf for none."""
+    """Extrapolated state of the orbit, and its distance from the last state [um], inf without an extrapolation."""
     stride = jnp.argmax(near) + 1
     places = stride * jnp.arange(_DIFFERENCES + 1)
     enough = jnp.any(near) & (fresh >= _DIFFERENCES * stride)
@@ -148,10 +148,10 @@ def _foreseen(past, seen, near: Bool[Array, " periods"], fresh) -> tuple[Unknown
 
 
 def _period(away: Float[Array, " periods"], tolerance: Scalar) -> Int[Array, ""]:
-    """The fewest cycles after which the state repeats, 0 for none.
+    """Smallest number of cycles after which the state repeats, 0 for none.
 
-    Fewer cycles must be clearly apart: an orbit that is still being approached along a spiral is met from afar now and
-    then.
+    States after fewer cycles must be clearly apart: a motion that spirals towards an orbit can come close to an earlier
+    state by chance.
     """
     closest: Bool[Array, " periods"] = away < tolerance
     nearer = jnp.concatenate([jnp.full((1,), jnp.inf, away.dtype), jax.lax.cummin(away)[:-1]])
@@ -166,7 +166,7 @@ _BALANCED = 0.99
 
 
 class AtOneSpeed(NamedTuple):
-    """Steady state at one speed; names and units of `SpeedResponse`."""
+    """Steady state at one speed; names and units as in `SpeedResponse`."""
 
     numbers: Numbers
     period: Int[Array, ""]
@@ -184,15 +184,15 @@ def steady_state(
     static: Scalar,
     waves: Float[Array, "nodes waves"],
 ) -> AtOneSpeed:
-    """Steady state at one speed that a start leads to, and its record.
+    """Steady state at one speed from a start, and the record of its orbit.
 
     Args:
-        oscillator: one.
-        y: start.
-        speed: and the steps of its cycles.
-        limits, sizes: of the sweep, as `speed_sweep.prepared` gives them.
-        static: mesh force at rest [N].
-        waves: of the orders at the nodes of a cycle.
+        oscillator: a single oscillator.
+        y: state at the start.
+        speed: mesh frequency and steps of a mesh cycle.
+        limits, sizes: limits and sizes of the sweep, from `speed_sweep.prepared`.
+        static: static mesh force [N].
+        waves: waves of the orders at the nodes of a cycle, from `waves_of`.
     """
     frequency = speed.frequency
     y, period = settled(oscillator, y, speed, limits.tolerance, limits.most_cycles, sizes.most_periods)
@@ -236,13 +236,13 @@ _FLAT = 1e-6  # a static transmission error with a smaller harmonic, as part of 
 
 
 class Kick(NamedTuple):
-    """How flanks are thrown apart.
+    """Start of a motion with separated flanks.
 
     Attributes:
-        apart: largest DTE less that at rest [um], negative.
-        acceleration: of the DTE where the flanks are apart [um/s^2].
-        phase: mesh position of the largest distance, from -1/2 to 1/2 [base pitches].
-        on: whether they are thrown at all.
+        apart: DTE at the largest separation minus the DTE at rest [um], negative.
+        acceleration: acceleration of the DTE while the flanks are separated [um/s^2].
+        phase: mesh position of the largest separation, from -1/2 to 1/2 [base pitches].
+        on: True if the flanks are separated.
     """
 
     apart: Scalar
@@ -252,18 +252,19 @@ class Kick(NamedTuple):
 
 
 def kick_of(oscillator: Oscillator, rest: Rest, factor: Scalar) -> Kick:
-    """The distance from which flanks meet again with a dynamic factor, and where on the cycle they are to have it.
+    """Separation of the flanks that leads to a dynamic factor at the next contact, and its mesh position.
 
     With the static deflection d of the mesh stiffness at mesh position 0, flanks that a constant force closes over a
-    gap g are pressed to the deflection d + (d^2 + 2 g d)^(1/2): a dynamic factor K needs g = ((K - 1)^2 - 1) d / 2. Up
-    to K = 2 contact is kept, and the DTE is released from (K - 1) d behind that at rest. Where the backlash is
-    less than the gap, the coast flanks throw them back harder.
+    gap g reach the deflection d + (d^2 + 2 g d)^(1/2): a dynamic factor K needs g = ((K - 1)^2 - 1) d / 2. Up to K = 2
+    the flanks stay in contact, and the DTE is released at (K - 1) d below its value at rest. If the backlash is smaller
+    than the gap, the rebound from the coast flanks is stronger.
 
-    Orbits of two mesh cycles are farthest apart a quarter of a cycle behind the softest mesh position, when the mesh
-    begins to stiffen. A gap there leads to them over a band of sizes somewhat below their own dynamic factor; an
-    impulse on flanks in contact does for scattered sizes only. The band narrows towards the speed at which the orbit
-    ends, and moves with speed, variation, damping and relief: 3.6 to 4.0 for unmodified gears at 1.36 times the natural
-    frequency, 2.5 to 2.8 for relieved ones at 1.75 times of it. One size does not do for all (`settings.KICKS`).
+    Orbits of two mesh cycles have their largest separation a quarter of a cycle after the softest mesh position, where
+    the mesh begins to stiffen. A gap there leads to these orbits over a range of sizes somewhat below their own dynamic
+    factor; an impulse on flanks in contact leads to them only at scattered sizes. The range narrows towards the speed
+    at which the orbit ends, and moves with speed, stiffness variation, damping and relief: 3.6 to 4.0 for unmodified
+    gears at 1.36 times the natural frequency, 2.5 to 2.8 for relieved gears at 1.75 times the natural frequency.
+    Several sizes are therefore tried (`settings.KICKS`).
     """
     along = oscillator.direction / oscillator.mass
     deflection = jnp.abs(rest.force) / rest.stiffness
@@ -280,9 +281,9 @@ def kick_of(oscillator: Oscillator, rest: Rest, factor: Scalar) -> Kick:
 
 
 def kicked(oscillator: Oscillator, start: State, kick: Kick, mesh_frequency: Scalar) -> State:
-    """A start with its DTE thrown so that it would stand still, the farthest away, at the mesh position of a kick.
+    """State at mesh position 0 whose DTE reaches the largest separation of a kick, at rest, at its mesh position.
 
-    At mesh position 0 the flanks are on their way there, or on their way back, under the static force alone.
+    Between mesh position 0 and the largest separation the DTE moves under the static force alone.
     """
     x, v = start
     time = kick.phase / mesh_frequency

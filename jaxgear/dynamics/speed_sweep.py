@@ -1,4 +1,4 @@
-"""Steady vibration over mesh frequency, with the state carried from speed to speed as on a test rig."""
+"""Steady vibration over mesh frequency; each speed starts from the state of the previous one, as on a test rig."""
 
 import dataclasses
 from collections.abc import Sequence
@@ -60,42 +60,41 @@ def speed_sweep(
     orders: Sequence[float] = ORDERS,
     kicks: Sequence[float] | jax.Array = (),
 ) -> SpeedResponse:
-    """Steady state at every mesh frequency, gone through upwards or downwards.
+    """Steady state at every mesh frequency, in ascending or descending order of the speeds.
 
-    At each speed mesh cycles are integrated until the state at mesh position 0 is that of one, two, three ... cycles
-    before, then the orbit found is recorded. Near a stable orbit the state that the cycles lead to is foreseen, so that
-    low damping needs few of them. `jax.vmap` of it makes many designs and loads; `speed_sweeps` shares them
-    out among devices.
+    At each speed mesh cycles are integrated until the state at mesh position 0 equals the state one, two, three ...
+    cycles before; then the orbit is recorded. Near a stable orbit its state is extrapolated, so that low damping needs
+    few cycles. Use `jax.vmap` for many designs and loads; `speed_sweeps` distributes them to devices.
 
     Args:
-        oscillator: one oscillator.
-        mesh_frequencies: [Hz], increasing whatever the direction, shape (speeds,).
-        direction: "up" begins at the first, "down" at the last.
-        start: coordinates and velocities at mesh position 0 at which the sweep begins, each of shape (coordinates,);
-            None for the static equilibrium.
-        kick: dynamic factor, greater than 1, with which the flanks meet after they have been thrown apart before the
-            sweep begins, about (`kick.kicked`). None for no kick.
-        carry: whether each speed begins with the state of the one before; otherwise each begins as the first one does.
-        steps: of the integrator per mesh cycle, even, one number or one for each speed, each a divisor of the largest;
-            None for as many as the natural frequencies need, which have to be known then: where the oscillator is being
-            traced, `steps_for` of a concrete one gives them.
-        tolerance: by how much the state may still differ, relative to its size; None for the root of the machine
-            precision.
-        most_cycles: after which a speed is left unsettled.
-        most_periods: largest number of mesh cycles of an orbit that is looked for.
-        points: mesh cycles that are recorded where no orbit was found, and Poincare points.
-        orders: of the harmonics, multiples of the mesh frequency.
-        kicks: dynamic factors, at least 1, with which the flanks are thrown apart at every speed, besides the motion
-            that is carried on. The orbit with the largest dynamic factor of them all is recorded and carried on. They
-            find orbits that hang together with no other, such as those of two mesh cycles below twice the natural
-            frequency; `settings.KICKS` are such. Each takes as long as a sweep.
+        oscillator: a single oscillator.
+        mesh_frequencies: mesh frequencies in increasing order for either direction [Hz], shape (speeds,).
+        direction: "up" starts at the first mesh frequency, "down" at the last.
+        start: coordinates [um] and velocities [um/s] at mesh position 0 at the start of the sweep, each of shape
+            (coordinates,); None for the static equilibrium.
+        kick: approximate dynamic factor, greater than 1, of the first contact after a start with separated flanks; None
+            for no kick.
+        carry: True to start each speed with the state of the previous one; False to start each like the first.
+        steps: even number of steps of the integrator per mesh cycle, one number or one for each speed, each a divisor
+            of the largest; None for the number that the natural frequencies need. A traced oscillator needs `steps`,
+            for instance by `steps_for` of a concrete one.
+        tolerance: tolerance of the repetition of the state, relative to its size; None for the square root of the
+            machine precision.
+        most_cycles: largest number of mesh cycles to settle; beyond it the speed has not converged.
+        most_periods: largest number of mesh cycles of an orbit.
+        points: number of mesh cycles recorded if no orbit was found, and number of Poincare points.
+        orders: orders of the harmonics, multiples of the mesh frequency.
+        kicks: dynamic factors, at least 1, of additional starts with separated flanks at every speed. The orbit with
+            the largest dynamic factor is recorded and continued. Kicks find orbits that are not connected with others,
+            such as orbits of two mesh cycles below twice the natural frequency; see `settings.KICKS`. Each kick takes
+            as long as a sweep.
 
     Returns:
         the response; speeds in the order of `mesh_frequencies`.
 
     Raises:
-        ValueError: in one line for frequencies that are no increasing list of positive numbers, an oscillator that
-            holds many, or an option outside its range.
+        ValueError: in one line for frequencies that are not increasing positive numbers, a batch of oscillators, or an
+            option outside its range.
     """
     frequencies = checked_frequencies(mesh_frequencies)
     check_single(oscillator)
@@ -121,14 +120,14 @@ def checked_frequencies(given: Numbers) -> Speeds:
 
 
 def steps_for(oscillator: Oscillator, mesh_frequencies: Numbers) -> tuple[int, ...]:
-    """Steps per mesh cycle that `speed_sweep` takes at each speed.
+    """Steps per mesh cycle that `speed_sweep` uses at each speed by default.
 
     Args:
-        oscillator: concrete; arrays may have batch axes in front, the stiffest then decides.
-        mesh_frequencies: [Hz], shape (speeds,).
+        oscillator: concrete oscillator, or a batch, of which the stiffest one decides.
+        mesh_frequencies: mesh frequencies [Hz], shape (speeds,).
 
     Raises:
-        ValueError: while being traced.
+        ValueError: for a traced oscillator.
     """
     frequencies = concrete(checked_frequencies(mesh_frequencies))
     if frequencies is None or any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves(oscillator)):
@@ -144,14 +143,14 @@ def steps_for(oscillator: Oscillator, mesh_frequencies: Numbers) -> tuple[int, .
 
 
 def check_single(oscillator: Oscillator) -> None:
-    """Raises a one-line `ValueError` for many."""
+    """Raise a one-line `ValueError` for a batch of oscillators."""
     if oscillator.mass.ndim != 1:
         many = f"oscillators of shape {oscillator.mass.shape[:-1]}"
         raise ValueError(f"oscillator holds {many}, must be one; many are for speed_sweeps or Dynamics.runs_of")
 
 
 class _Limits(NamedTuple):
-    """Numbers of a sweep that may change without a new program."""
+    """Options of a sweep that do not require a new compilation."""
 
     steps: Int[Array, " speeds"]
     down: Bool[Array, ""]
@@ -176,7 +175,8 @@ def prepared(
     orders: Sequence[float] = ORDERS,
     kicks: Sequence[float] | jax.Array = (),
 ) -> tuple[_Sizes, _Limits]:
-    """Options of a sweep, checked: what is static and what is not; without an oscillator for given steps alone."""
+    """Check the options of a sweep; returns static sizes and traced limits. Without an oscillator `steps` are needed.
+    """
     if direction not in ("up", "down"):
         raise ValueError(f'direction = {direction!r} must be "up" or "down"')
     if not isinstance(carry, bool):
@@ -223,7 +223,7 @@ def _counts(oscillator, frequencies, steps) -> tuple[int, ...]:
 
 
 def start_of(oscillator: Oscillator, start: State | None) -> State | None:
-    """A given start, checked."""
+    """Checked start of a sweep; None for the static equilibrium."""
     if start is None:
         return None
     shape = oscillator.mass.shape
@@ -243,7 +243,7 @@ def swept(
     rest, static = at_rest(oscillator, jnp.zeros((), frequencies.dtype)), static_force(oscillator)
     begin = (rest.coordinates, jnp.zeros_like(rest.coordinates)) if start is None else start
     kick = kick_of(oscillator, rest, limits.kick)
-    # the motion carried on, then the kicks; those that are none come last and are not gone through
+    # the continued motion, then the kicks; kicks of 1 come last and are skipped
     factors = jnp.concatenate([jnp.ones(1, frequencies.dtype), -jnp.sort(-limits.kicks)])
     starts = 1 + jnp.sum(limits.kicks > 1)
     cycle = cycle_of(oscillator, sizes.most_steps)

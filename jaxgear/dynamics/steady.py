@@ -1,4 +1,4 @@
-"""Numbers and forces of steady vibration with derivatives, whatever the number of cycles after which it repeats."""
+"""Results and mesh forces of steady vibration with derivatives, for orbits of up to four mesh cycles."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -24,10 +24,10 @@ _SAME = 1e-2
 
 
 class SteadyNumbers(NamedTuple):
-    """Names and units of `SpeedResponse`; the derivatives of the shares of time are zero.
+    """Results of steady vibration, names and units as in `SpeedResponse`; derivatives of the shares of time are zero.
 
     Attributes:
-        exact: whether numbers and derivatives are those of an orbit, not of a motion without a period.
+        exact: True for values and derivatives of an orbit; False for a motion that does not repeat.
     """
 
     dynamic_factor: Numbers
@@ -38,15 +38,15 @@ class SteadyNumbers(NamedTuple):
 
 
 def differentiable(oscillator: Oscillator, responses: Sequence[SpeedResponse], steps: int) -> SteadyNumbers:
-    """Numbers of responses with their derivatives by every number of the oscillator, leading axis (responses,).
+    """Results of responses with derivatives with respect to every number of the oscillator, leading axis (responses,).
 
-    The orbits that the motion has settled on are found again by Newton's method, whose derivatives are exact. Where it
-    has settled on none, the numbers are those that were recorded, without derivatives.
+    Newton's method finds the orbits of the responses again, with exact derivatives. Without an orbit the recorded
+    values are returned, without derivatives.
 
     Args:
-        oscillator: that the response is of.
-        responses: to as many speeds each, with orbits of up to four mesh cycles.
-        steps: of a mesh cycle.
+        oscillator: oscillator of the responses.
+        responses: responses at the same number of speeds each, with orbits of up to four mesh cycles.
+        steps: steps of a mesh cycle.
     """
     each = [(of.mesh_frequency, *_settled_on(of), _recorded(of)) for of in responses]
     together = jax.tree.map(lambda *parts: jnp.concatenate(parts), *each)
@@ -71,7 +71,7 @@ def _settled_on(of: SpeedResponse):
 
 
 def _recorded(of: SpeedResponse) -> SteadyNumbers:
-    """The numbers of a response, without derivatives."""
+    """Recorded results of a response, without derivatives."""
     found = of.dynamic_factor, of.dte_rms, of.contact_loss_share, of.back_side_contact, jnp.zeros_like(of.status, bool)
     return jax.lax.stop_gradient(SteadyNumbers(*found))
 
@@ -85,7 +85,7 @@ def _of_orbit(oscillator, frequency, start, periods: int, steps: int, recorded: 
 def _orbit_of(
     oscillator, frequency, start, periods: int, steps: int, recorded: SteadyNumbers
 ) -> tuple[Orbit, Bool[Array, ""]]:
-    """The orbit through a state that the motion has settled on, and whether it is that of the motion."""
+    """Orbit next to a settled state, and True if it agrees with the recorded motion."""
     orbit = find_orbit(oscillator, frequency, start, periods=periods, steps=steps)
     scale = recorded.dte_rms + jnp.finfo(orbit.dte_rms.dtype).eps ** 0.5 * jnp.abs(orbit.dte_mean)
     same = jnp.abs(orbit.dynamic_factor - recorded.dynamic_factor) <= _SAME * recorded.dynamic_factor
@@ -97,10 +97,10 @@ class SteadyForce(NamedTuple):
 
     Attributes:
         force: elastic force at mesh positions of successive cycles [N], shape (cycles, positions), negative on the
-            coast flanks; as many cycles as any orbit that is looked for repeats in.
-        dynamic_factor: largest force at any time over the static one.
-        back_side_contact: whether the coast flanks touch at any time.
-        status: of the motion and of its mesh force; forces are the static one where it has not converged.
+            coast flanks; the number of cycles is a common multiple of the periods of all orbits considered.
+        dynamic_factor: largest force at any time over the static force.
+        back_side_contact: True if the coast flanks touch at any time.
+        status: status of the motion and of its mesh force; if not converged, all forces are the static force.
     """
 
     force: Float[Array, "cycles positions"]
@@ -112,14 +112,14 @@ class SteadyForce(NamedTuple):
 def steady_force(
     oscillator: Oscillator, frequency: Scalar, response: SpeedResponse, phase: Positions, steps: int
 ) -> SteadyForce:
-    """Mesh force of the orbit that a motion has settled on.
+    """Mesh force of the steady orbit of a response.
 
     Args:
-        oscillator: that the response is of.
-        frequency: of the mesh [Hz].
-        response: to that one speed, with orbits of up to four mesh cycles.
+        oscillator: oscillator of the response.
+        frequency: mesh frequency [Hz].
+        response: response at this single speed, with orbits of up to four mesh cycles.
         phase: mesh positions [base pitches], shape (positions,).
-        steps: of a mesh cycle.
+        steps: steps of a mesh cycle.
     """
     recorded, start, period = jax.tree.map(lambda part: part[0], (_recorded(response), *_settled_on(response)))
     even = static_force(oscillator)
@@ -145,7 +145,7 @@ def steady_force(
 
 
 def _at_positions(oscillator: Oscillator, orbit: Orbit, phase: Positions) -> Float[Array, "cycles positions"]:
-    """Force of an orbit of even steps at mesh positions, by the cubics through its DTE and the rate of that."""
+    """Force of an orbit of even steps at mesh positions [N], by cubic interpolation of the DTE and its rate."""
     count = len(orbit.phase)
     steps = count // orbit.periods
     place = ((phase - jnp.floor(phase))[None] + jnp.arange(orbit.periods, dtype=phase.dtype)[:, None]) * steps

@@ -15,15 +15,15 @@ from .oscillator import NEWTON, Excitation, Oscillator
 Scalar = Float[Array, ""]
 
 _MM = 1e-3  # in m
-DIRECTIONS = 2, 3  # in which a bearing may give way: along and across the line of action, and along the axis
+DIRECTIONS = 2, 3  # directions of bearing stiffness: along and across the line of action, and along the axis
 _BEARING = "(2, 2, 2) or (2, 3, 3): of pinion and wheel, along, across[, axial]"
 
 
 def inertia_of(gear: Gear) -> Scalar:
     """Moment of inertia of a gear body about its axis [kg m2]: a ring from the bore to the reference pitch circle.
 
-    Over its own face width and with the density of its material; a solid disc where the gear has no `bore_diameter`.
-    Oscillators take another inertia as an argument.
+    It uses face width and density of the gear; a gear without `bore_diameter` is a solid disc. Oscillators accept other
+    inertias as an argument.
     """
     outer, inner = _radii(gear)
     return jnp.pi / 2 * gear.material.density * gear.face_width * _MM * (outer**4 - inner**4)
@@ -48,7 +48,8 @@ def equivalent_mass(pair: GearPair, inertias: Numbers | None = None) -> Scalar:
 
     Args:
         pair: pinion and wheel.
-        inertias: of pinion and wheel [kg m2], with what turns with them; None for `inertia_of` the gears.
+        inertias: moments of inertia of pinion and wheel and of the parts that turn with them [kg m2]; None for
+            `inertia_of` the gears.
 
     Raises:
         ValueError: in one line for inertias that are not two positive numbers.
@@ -67,20 +68,20 @@ def torsional(
     mean_stiffness: Given | None = None,
     excitation: Excitation | None = None,
 ) -> Oscillator:
-    """The relative rotation of two gears on the line of action, one coordinate: the DTE q [um].
+    """Torsional oscillator of two gears with one coordinate, the DTE q on the line of action [um].
 
     m q'' + c q' + F(phase, q) = T_1 / r_b1
 
     Args:
-        mesh_force: of the mesh.
+        mesh_force: mesh force.
         pair: pinion and wheel.
-        torque: on the pinion [N m].
-        damping_ratio: of the vibration with the mean stiffness, c = 2 ratio sqrt(k m).
-        damping: c [N s/um], in place of the ratio. Either acts with and without contact.
-        inertias: of pinion and wheel [kg m2]; None for `inertia_of` the gears.
-        mean_stiffness: k of the damping ratio [N/um]; None for the `mean_tangent_stiffness` of the mesh force under the
-            static load.
-        excitation: None for none. Its displacement is taken off the DTE.
+        torque: torque on the pinion [N m].
+        damping_ratio: damping ratio at the mean stiffness, c = 2 ratio sqrt(k m).
+        damping: viscous damping c [N s/um], in place of the ratio. Damping acts with and without contact.
+        inertias: moments of inertia of pinion and wheel [kg m2]; None for `inertia_of` the gears.
+        mean_stiffness: stiffness k for the damping ratio [N/um]; None for the `mean_tangent_stiffness` of the mesh
+            force under the static load.
+        excitation: external excitation, whose displacement is subtracted from the DTE; None for none.
 
     Raises:
         ValueError: in one line for both or neither of damping and damping_ratio, or a number outside its range.
@@ -104,12 +105,13 @@ def two_gears(
     mean_stiffness: Given | None = None,
     excitation: Excitation | None = None,
 ) -> Oscillator:
-    """Pinion and wheel as two coordinates, r_b1 theta_1 and r_b2 theta_2 [um], which nothing holds.
+    """Pinion and wheel as two coordinates, r_b1 theta_1 and r_b2 theta_2 [um], without springs to ground.
 
     I_1 / r_b1^2 x_1'' + F + c q' = T_1 / r_b1,   I_2 / r_b2^2 x_2'' - F - c q' = -T_1 / r_b1,   q = x_1 - x_2
 
-    The torque of the wheel balances that of the pinion; arguments and errors of `torsional`. A component of a larger
-    model: what is joined to the gears adds to `load`, `stiffness` and `damping`, or to what the vector field returns.
+    The torque on the wheel balances the torque on the pinion. Arguments and errors are those of `torsional`. As a
+    component of a larger model, parts joined to the gears add to `load`, `stiffness` and `damping`, or to the value of
+    the vector field.
     """
     masses, force = _masses(pair, inertias), _force(pair, torque)
     c = _damping(mesh_force, 1 / jnp.sum(1 / masses), force, damping_ratio, damping, mean_stiffness)
@@ -140,27 +142,28 @@ def on_bearings(
 ) -> Oscillator:
     """Two gears whose centres move on flexible bearings: five coordinates [um], or seven with axial motion.
 
-    In order: the relative rotation u = r_b1 theta_1 - r_b2 theta_2; the centre of the pinion along the line of action,
-    in the direction in which it pushes the wheel, across, and along its axis, positive as face coordinates are; the
-    centre of the wheel likewise. A helical gear that moves along its axis screws out of the mesh, so that the DTE is
+    The coordinates are, in this order: the relative rotation u = r_b1 theta_1 - r_b2 theta_2; the displacement of the
+    centre of the pinion along the line of action (positive in the direction of its force on the wheel), across it, and
+    along its axis (positive like face coordinates); the displacements of the centre of the wheel. Axial displacements
+    of helical gears change the DTE,
 
         q = u + along_1 - along_2 - tan(beta_b) (axial_1 - axial_2)
 
     with the base helix angle of the pinion, positive for a right hand. The bearings carry the mesh force F and the
     axial force F tan(beta_b): at rest the pinion is displaced by -F / k_1 along the line of action and by
-    F tan(beta_b) / k_1 along its axis, the wheel the other way. Gears do not tilt: the moment of the axial force about
-    their centres is carried rigidly.
+    F tan(beta_b) / k_1 along its axis, the wheel in the opposite directions. The gears do not tilt: the moment of the
+    axial force about their centres has a rigid support.
 
     Args:
         mesh_force, pair, torque, damping_ratio, damping, inertias, mean_stiffness, excitation: as for `torsional`.
-        bearing_stiffness: of the supports of pinion and wheel [N/um], symmetric: in (along, across), shape (2, 2, 2),
-            where axial forces are carried rigidly; or in (along, across, axial), shape (2, 3, 3).
-        bearing_damping: likewise, of the same shape [N s/um]; None for none.
-        masses: of the bodies that move on the bearings [kg], pinion and wheel; None for those of the bodies of
+        bearing_stiffness: symmetric stiffness matrices of the supports of pinion and wheel [N/um]: in (along, across),
+            shape (2, 2, 2), with rigid axial supports; or in (along, across, axial), shape (2, 3, 3).
+        bearing_damping: damping matrices of the supports [N s/um], same shape; None for none.
+        masses: masses of pinion and wheel that move on the bearings [kg], shape (2,); None for the gear bodies of
             `inertia_of`.
 
     Raises:
-        ValueError: in one line as for `torsional`, and for a bearing that is not symmetric or not stiff.
+        ValueError: in one line as for `torsional`, and for a stiffness that is not symmetric or not positive definite.
     """
     mass, force = equivalent_mass(pair, inertias), _force(pair, torque)
     c = _damping(mesh_force, mass, force, damping_ratio, damping, mean_stiffness)
@@ -235,7 +238,7 @@ def _damping(mesh_force, mass, force, ratio, damping, stiffness) -> Scalar:
 
 
 def _on_ground(name: str, unit: str, given: Any, *, stiff: bool) -> Float[Array, "centres centres"]:
-    """Matrix of two bearings at the coordinates of both centres."""
+    """Block matrix of the bearings of pinion and wheel over the coordinates of both centres."""
     given = real(given)
     if given.shape not in [(2, count, count) for count in DIRECTIONS]:
         raise ValueError(f"{name} has shape {given.shape}, must be {_BEARING}")
@@ -252,5 +255,5 @@ def _on_ground(name: str, unit: str, given: Any, *, stiff: bool) -> Float[Array,
 
 
 def _beside_rotation(of_centres: Float[Array, "centres centres"]) -> Float[Array, "coordinates coordinates"]:
-    """The matrix with that of the relative rotation, which nothing holds, in front."""
+    """Matrix with a leading zero row and column for the relative rotation, which has no spring to ground."""
     return jnp.pad(of_centres, ((1, 0), (1, 0)))

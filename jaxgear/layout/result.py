@@ -50,15 +50,16 @@ class LayoutResult(AbstractStudyResult):
         torques: torques of K_Hbeta on the pinion [N m].
         profile_torque: torque of step 3 on the pinion [N m].
         layouts: flank lines, by the name of the support; the first is that of the design.
-        over_torque: K_Hbeta of the design after every of the `STEPS` at the torques, without deviations.
+        over_torque: K_Hbeta of the design over the torques, without deviations, by step of `STEPS`.
         meshes: meshes of step 3, by the name of the support; empty without step 3.
         contacts: contact results of the flank lines of every step on their shafts, by the names of the support and of
             the step; empty without step 3 on shafts.
         contact_cases: K_Hbeta of the contact in the five cases of deviations, by the names of the support, of the
-            tolerance and of the step, likewise.
-        cycles: mesh cycles on the first support, "unmodified" and with all three steps as "layout", likewise.
-        factors: K_Hbeta of the one-dimensional analysis at the torque of the contact and on as many stations as it has
-            slices, by the names of the support and of the step, likewise.
+            tolerance and of the step; empty without step 3 on shafts.
+        cycles: mesh cycles on the first support, "unmodified" and "layout" with all three steps; empty without step 3
+            on shafts.
+        factors: K_Hbeta of the one-dimensional analysis at the torque of step 3, with as many stations as the contact
+            has slices, by the names of the support and of the step; empty without step 3 on shafts.
         profiles: profile modifications of step 3, by the name of the support.
         unusual: findings of every layout, by the name of the support.
         stations_change: change of K_Hbeta of the one-dimensional analysis at twice the stations, of the design at the
@@ -97,7 +98,7 @@ class LayoutResult(AbstractStudyResult):
     def lives(self, profile: ProfileLayout) -> dict[str, np.ndarray]:
         """Life [h] of pinion and wheel with every profile modification, by K_Hbeta of its contact, shape (variants,).
 
-        That factor is of the torque of step 3 and stands for every load. Empty without a duty cycle.
+        K_Hbeta at the torque of step 3 is used for every load. The result is empty without a duty cycle.
         """
         load, strength = (self.options.get(name) for name in ("duty_cycle", "strength"))
         if load is None or strength is None:
@@ -117,7 +118,7 @@ class LayoutResult(AbstractStudyResult):
         return found
 
     def verdict(self) -> Iterator[str]:
-        """The layout in words."""
+        """Lines that describe the layout."""
         layout = self.main
         for name, line in (("pinion", layout.pinion), ("wheel", layout.wheel)):
             yield f"flank line of the {name}: slope {float(line.slope):.1f} um, crowning {float(line.crowning):.1f} um"
@@ -240,7 +241,7 @@ class LayoutResult(AbstractStudyResult):
         }
 
     def tables(self) -> Iterator[Table]:
-        """The steps, what the contact says of them, and the bearings."""
+        """Tables of the steps, of their contact results, and of the bearings."""
         yield self._steps()
         if self.contacts:
             yield self._contacts()
@@ -307,7 +308,7 @@ class LayoutResult(AbstractStudyResult):
         return result
 
     def write(self, folder: Path) -> None:
-        """The flanks after every step as `flanks.csv`, and the variants of step 3 as `profiles.csv`."""
+        """Write the flanks after every step to `flanks.csv`, and the variants of step 3 to `profiles.csv`."""
         # the flanks need no mesh, which only step 3 has
         moving = kinematics(self.design.pair(), real(0.0), self.design.resolution(), "strain")
         write_flanks(folder / "flanks.csv", moving, self.designs())
@@ -315,7 +316,7 @@ class LayoutResult(AbstractStudyResult):
             self.profile.table.to_csv(folder / "profiles.csv")
 
     def figures(self) -> Iterator[Figure]:
-        """The cases, K_Hbeta over the torque, shafts, profiles and the contact."""
+        """Figures of the tolerance cases, K_Hbeta over the torque, shafts, profile modifications and the contact."""
         from .. import plot
         from . import figures
 
@@ -347,7 +348,7 @@ class LayoutResult(AbstractStudyResult):
 
 
 def flank_lines(layout: FlankLineLayout) -> dict[str, tuple[FlankLine, FlankLine]]:
-    """Flank lines of pinion and wheel over their own faces, after every of the `STEPS`."""
+    """Flank lines (pinion, wheel) over the faces of the gears, by step of `STEPS`."""
     none = FlankLine()
     level = layout.line.on(layout.pair, layout.gear)
     first = (level, none) if layout.gear == "pinion" else (none, level)
@@ -355,7 +356,7 @@ def flank_lines(layout: FlankLineLayout) -> dict[str, tuple[FlankLine, FlankLine
 
 
 def root_factor(layout: FlankLineLayout, factor: Given) -> np.ndarray:
-    """K_Fbeta of K_Hbeta."""
+    """K_Fbeta from K_Hbeta for the gears of a layout."""
     pair = layout.pair
     return np.asarray(root_face_load_factor(np.maximum(factor, 1.0), pair.face_width, tooth_height(pair)))
 

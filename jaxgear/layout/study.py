@@ -1,4 +1,4 @@
-"""The layout study: from a design file with shafts to its flank lines and profiles, in three steps."""
+"""Layout study: flank lines and profile modifications of a design file with shafts, in three steps."""
 
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Self
@@ -31,8 +31,9 @@ _TORQUES, _QUICK_TORQUES = 25, 7  # over the range of the file
 class LayoutStudy(AbstractStudy[LayoutResult]):
     """Find the flank lines of the pair on its shafts, and its profile modifications, in three steps.
 
-    Step 1 levels the load over the face or finds the longest life under a duty cycle, step 2 keeps the load off the
-    edges within the tolerances, step 3 tries profile modifications in all combinations. With and without housing.
+    Step 1 levels the load over the face or finds the longest life under a duty cycle. Step 2 adds crowning so that the
+    face ends carry no excess load within the tolerances. Step 3 evaluates all combinations of profile modifications.
+    The command computes every step with and without the housing.
 
     Attributes:
         supports: mesh on its shafts, in the housing first where there is one, then on rigid seats.
@@ -79,7 +80,7 @@ class LayoutStudy(AbstractStudy[LayoutResult]):
         return left_out(self.design, "flank lines deviate by the limits of [layout]")
 
     def work_out(self, checkpoints: Checkpoints, stages: Stages) -> LayoutResult:
-        """Flank lines on every support, then profile modifications; keeps no checkpoints."""
+        """Find flank lines on every support, then profile modifications; writes no checkpoints."""
         design, quick = self.design, self.quick
         layouts: dict[str, FlankLineLayout] = {}
         for name, support in self.supports.items():
@@ -151,7 +152,7 @@ class LayoutStudy(AbstractStudy[LayoutResult]):
 
 
 def _check_open(design: DesignFile) -> None:
-    """Raises a `DesignFileError` for what a layout finds itself."""
+    """Raise a `DesignFileError` for values in the file that a layout determines itself."""
     if design.bounds:
         raise DesignFileError("variables", f"layout needs numbers, these are free: {', '.join(design.bounds)}")
     for gear, parts in (("pinion", design.design.pinion), ("wheel", design.design.wheel)):
@@ -160,7 +161,7 @@ def _check_open(design: DesignFile) -> None:
 
 
 def _finer(study: LayoutStudy, name: str) -> Mesh:
-    """The mesh of step 3 on its shafts with twice the slices."""
+    """Mesh of step 3 on its shafts, with twice the slices."""
     design = study.design
     size = design.resolution()
     widths = None if size.parts is None else tuple(int(part) for part in np.repeat(size.parts, 2))
@@ -198,9 +199,9 @@ def _contacts(
 
 
 def _cycles(study: LayoutStudy, mesh: Mesh, layout: FlankLineLayout, profile: ProfileLayout) -> dict[str, MeshCycle]:
-    """The contact without modification and with all three steps."""
+    """Mesh cycles without modification and with the modifications of all three steps."""
     modified = tuple(line + own for line, own in zip(layout.modifications, profile.profiles))
-    # of zero amounts: one program serves both
+    # zero amounts in place of no modification: one program serves both
     nothing = jax.tree.map(jnp.zeros_like, modified)
     torque = study.profile_torque
     return {
@@ -229,7 +230,7 @@ def _held(support: ShaftSupport, torque: float, size: Resolution) -> AbstractSup
 def _profile(
     study: LayoutStudy, wanted: ProfileSection, mesh: Mesh, layout: FlankLineLayout, stages: Stages
 ) -> ProfileLayout:
-    """Step 3 on the flank lines, or on what they leave where they have levelled the load: the further crowning."""
+    """Step 3 on the flank lines; if step 1 has levelled the load, on the further crowning of step 2 alone."""
     for_pinion, for_wheel = (FlankLine(crowning=amount) for amount in layout.further)
     left = for_pinion.on(layout.pair, "pinion").modification, for_wheel.on(layout.pair, "wheel").modification
     return vary_profiles(

@@ -36,33 +36,33 @@ from .study import AbstractStudy
 
 
 class ComparisonRun:
-    """Evaluates designs on one mesh and collects them.
+    """Evaluate designs on one mesh and collect their results.
 
     Args:
-        design: the design file.
-        stages: told what goes on.
-        quick: on coarse positions and few torques.
+        design: design file.
+        stages: progress of the study.
+        quick: True for coarse positions and few torques.
     """
 
     def __init__(self, design: DesignFile, stages: Stages, *, quick: bool = False) -> None:
         self.design, self._stages, self._quick = design, stages, quick
         self._evaluations: dict[str, Evaluation] = {}
-        self._problem: Problem | None = None  # by whose measure designs are evaluated
+        self._problem: Problem | None = None  # problem whose objectives are evaluated for all designs
         self._optimum: Optimum | None = None
         self._front: Front | None = None
         self._projection: Projection | None = None
-        self._second: TabulatedCompliance | None = None  # by which designs are verified
-        self._unverified = ""  # why not
+        self._second: TabulatedCompliance | None = None  # compliance for the verification
+        self._unverified = ""  # reason for no verification
 
     def prepare(self, *, finer: int | None = None, verify: bool | None = False) -> None:
-        """Prepares the mesh.
+        """Prepare the mesh, and the finite-element structure for the verification.
 
         Args:
-            finer: positions on which a search will end.
-            verify: whether the designs are evaluated with the finite-element structure too; None where that goes.
+            finer: number of positions on which a search will end; None without a search.
+            verify: True to evaluate the designs also with the finite-element structure; None to do so if possible.
 
         Raises:
-            DesignFileError: where it is asked for and does not go.
+            DesignFileError: if the verification is required but not possible.
         """
         self._stages.begin("preparing the mesh")
         size = self.design.resolution()
@@ -75,8 +75,8 @@ class ComparisonRun:
             self._make_tables(finer, required=verify is not None)
 
     def _make_tables(self, finer: int | None, *, required: bool) -> None:
-        """Before the search: what cannot be verified is known at once, and an interruption costs no optimum."""
-        if self._mesh.pair.is_spur:  # others are refused at once
+        """Make the compliance tables before the search, so that an error or interruption here loses no optimum."""
+        if self._mesh.pair.is_spur:  # helical pairs raise an error at once
             self._stages.begin("finite-element tables of pinion and wheel, made once and kept")
         try:
             self._second = structure_for(self._mesh)
@@ -88,7 +88,7 @@ class ComparisonRun:
         begin_verification(self._mesh, self._second, finer)
 
     def evaluate(self, name: str, pinion: AbstractModification, wheel: AbstractModification) -> None:
-        """Evaluates a design and keeps it."""
+        """Evaluate a design and store its results under a name."""
         self._stages.begin(f"solving the {name} design")
         found = evaluation_of(self.design, self._mesh, self._torques, pinion, wheel)
         if self._problem is not None:
@@ -96,9 +96,9 @@ class ComparisonRun:
         self._evaluations[name] = found
 
     def search(self, search: Search, beside: Mapping[str, Modifications]) -> None:
-        """Finds the optimum, and for flanks without parameters the named curve in their place.
+        """Find the optimum, and for free-form flanks its projection on the named curve.
 
-        All designs, those `beside` it too, are evaluated on the mesh on which the search has ended and by its measure.
+        The optimum and the designs `beside` it are evaluated on the final mesh of the search, with its objectives.
         """
         self._stages.begin(f"searching the optimum ({search.method})")
         began = time.perf_counter()
@@ -113,7 +113,7 @@ class ComparisonRun:
         self.evaluate(name, optimum.pinion, optimum.wheel)
         evaluated = dataclasses.replace(self._evaluations[name], seconds=spent)
         self._evaluations[name] = evaluated
-        # of several torques it shows another one than the table does
+        # with several torques it belongs to another torque than the table
         ppte = float(evaluated.metrics["ppte_um"])
         self._optimum = optimum = dataclasses.replace(optimum, cycle=evaluated.cycle, ppte=ppte)
         if search.curve is not None:
@@ -124,7 +124,7 @@ class ComparisonRun:
             self._verify(self._second)
 
     def _verify(self, second: TabulatedCompliance) -> None:
-        """Evaluates all designs again with the finite-element structure."""
+        """Evaluate all designs again with the finite-element structure."""
         self._stages.begin("verifying with the finite-element structure")
         by_finite_elements = verification(self._mesh, second, self._problem)
         for name, claimed in self._evaluations.items():
@@ -172,11 +172,11 @@ class AnalysisStudy(AbstractStudy[ComparisonResult]):
             return cls(design, quick, manufactured.gears_of(design, quick=quick))
 
     def omits(self) -> str:
-        """Nothing."""
+        """Empty message: no table of the file is ignored."""
         return ""
 
     def work_out(self, checkpoints: Checkpoints, stages: Stages) -> ComparisonResult:
-        """Both designs; keeps no checkpoints."""
+        """Evaluate both designs; writes no checkpoints."""
         run = ComparisonRun(self.design, stages, quick=self.quick)
         run.prepare()
         run.evaluate("unmodified", NoModification(), NoModification())
@@ -190,8 +190,8 @@ class AnalysisStudy(AbstractStudy[ComparisonResult]):
 class OptimizationStudy(AbstractStudy[ComparisonResult]):
     """Find the best variables or flanks by the method and for the objective of the design file.
 
-    Without a word about them that is the least peak-to-peak transmission error (PPTE) at the design torque. Compares
-    the unmodified pair, the rule-based tip relief of ISO 6336-1, and the optimum.
+    The default objective is the peak-to-peak transmission error (PPTE) at the design torque. The command compares the
+    unmodified pair, the rule-based tip relief of ISO 6336-1, and the optimum.
 
     Attributes:
         search: search for the optimum.
@@ -200,7 +200,7 @@ class OptimizationStudy(AbstractStudy[ComparisonResult]):
 
     name: ClassVar = "optimize"
     takes_coast: ClassVar = True
-    coarse: ClassVar = ""  # the result says it
+    coarse: ClassVar = ""  # the result reports it
     needs: ClassVar = ("scipy.optimize",)
 
     search: Search
@@ -219,11 +219,11 @@ class OptimizationStudy(AbstractStudy[ComparisonResult]):
         return f"{self.name}/{self.search.method}"
 
     def omits(self) -> str:
-        """Nothing."""
+        """Empty message: no table of the file is ignored."""
         return ""
 
     def work_out(self, checkpoints: Checkpoints, stages: Stages) -> ComparisonResult:
-        """All designs; keeps no checkpoints."""
+        """Search the optimum and evaluate all designs; writes no checkpoints."""
         run = ComparisonRun(self.design, stages, quick=self.quick)
         run.prepare(finer=self.search.finer, verify=self.search.verify)
         relief, involute = rule_based(self.design), NoModification()

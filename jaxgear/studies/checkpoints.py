@@ -23,38 +23,38 @@ _PAIR = "state"  # a field of two arrays
 
 
 class Codec(Protocol[R]):
-    """How results become named arrays and results again."""
+    """Conversion of a kind of result to named arrays and back."""
 
     def arrays(self, found: R) -> dict[str, Any]:
-        """All that a result holds."""
+        """Arrays with the complete content of a result, by name."""
 
     def result(self, arrays: dict[str, Any]) -> R:
-        """The result; raises `KeyError`, `TypeError` or `ValueError` for other arrays."""
+        """Result from its arrays; raises `KeyError`, `TypeError` or `ValueError` for arrays that do not fit."""
 
 
 class NamedArrays:
-    """Results that are arrays by name, as they are."""
+    """Codec of results that are named arrays already."""
 
     def arrays(self, found: Mapping[str, Any]) -> dict[str, Any]:
-        """All of them."""
+        """Copy of the named arrays."""
         return dict(found)
 
     def result(self, arrays: dict[str, Any]) -> Mapping[str, Any]:
-        """The arrays."""
+        """The named arrays, unchanged."""
         return arrays
 
 
 class SpeedResponses:
-    """Speed responses as arrays."""
+    """Codec of speed responses."""
 
     def arrays(self, found: SpeedResponse) -> dict[str, Any]:
-        """All that a response holds."""
+        """Arrays of all fields of a speed response, by name."""
         fields = {field.name: getattr(found, field.name) for field in dataclasses.fields(found)}
         displacement, velocity = fields.pop(_PAIR)
         return {"displacement": displacement, "velocity": velocity, **fields}
 
     def result(self, arrays: dict[str, Any]) -> SpeedResponse:
-        """The response."""
+        """Speed response from its arrays."""
         orders = tuple(arrays.pop("orders").tolist())
         direction: Any = str(arrays.pop("direction"))
         known: dict[str, Any] = {name: jnp.asarray(value) for name, value in arrays.items()}
@@ -63,24 +63,25 @@ class SpeedResponses:
 
 
 class Marches:
-    """Blocks of wear as arrays."""
+    """Codec of blocks of wear."""
 
     def arrays(self, found: March) -> dict[str, Any]:
-        """All that they hold."""
+        """Arrays of wear depths, errors, status and contact results, by name."""
         return {"depth": found.depth, "error": found.error, "march_status": found.status, **found.seen}
 
     def result(self, arrays: dict[str, Any]) -> March:
-        """The blocks."""
+        """Blocks of wear from their arrays."""
         known = {name: jnp.asarray(value) for name, value in arrays.items()}
         return March(known.pop("depth"), known.pop("error"), known.pop("march_status"), known)
 
 
 class Checkpoints:
-    """Results of a study in a folder, each under the digest of what it was made of.
+    """Intermediate results of a study in a folder, one file each, named by the digest of its inputs.
 
     Args:
-        folder: folder of the results, made with the first one; None keeps nothing.
-        callback: called after every result with the number of results of its kind so far and in all, None if unknown.
+        folder: folder of the files, made with the first one; None to store nothing.
+        callback: called after every result with the number of results of its kind so far and the total, None if
+            unknown.
     """
 
     def __init__(
@@ -90,19 +91,19 @@ class Checkpoints:
         self._callback, self._used = callback, False
 
     def of(self, codec: Codec[R], total: int | None = None) -> "CheckpointsOfKind[R]":
-        """The checkpoints of one kind of result.
+        """Checkpoints of one kind of result.
 
         Args:
-            codec: of the results; `NamedArrays()` for arrays by name.
-            total: how many there will be; None where it is not known.
+            codec: codec of the results; `NamedArrays()` for named arrays.
+            total: number of results expected; None if unknown.
         """
         return CheckpointsOfKind(self, codec, total)
 
     def count(self) -> int:
-        """How many results an interrupted study has left.
+        """Number of results stored by an interrupted study.
 
         Raises:
-            ValueError: when the folder cannot be read.
+            ValueError: if the folder cannot be read.
         """
         if self.folder is None:
             return 0
@@ -111,32 +112,32 @@ class Checkpoints:
             return sum(not path.name.startswith(".") for path in there)
 
     def told(self, done: int, total: int | None) -> None:
-        """Tells the callback."""
+        """Call the callback with the number of results so far and the total."""
         self._used = True
         if self._callback is not None and self.folder is not None:
             self._callback(done, total)
 
     def remove(self) -> None:
-        """Removes what this study has kept: all of it is in its results now."""
+        """Remove the folder if this study has used it: the final results contain everything."""
         if self._used and self.folder is not None:
             shutil.rmtree(self.folder, ignore_errors=True)
 
 
 class CheckpointsOfKind(Generic[R]):
-    """Results of one kind; made by `Checkpoints.of`."""
+    """Checkpoints of one kind of result; made by `Checkpoints.of`."""
 
     def __init__(self, checkpoints: Checkpoints, codec: Codec[R], total: int | None) -> None:
         self._checkpoints, self._codec, self._total, self._done = checkpoints, codec, total, 0
 
     def __call__(self, made_of: object, make: Callable[[], R]) -> R:
-        """The result that is there, or that is made and then kept.
+        """Load a stored result, or compute and store it.
 
         Args:
-            made_of: a pytree of all that it depends on.
-            make: makes it.
+            made_of: pytree of all inputs of the result.
+            make: function that computes the result.
 
         Raises:
-            ValueError: when it cannot be written.
+            ValueError: if the file cannot be written.
         """
         folder = self._checkpoints.folder
         path = None if folder is None else folder / _digest(made_of)
@@ -160,9 +161,9 @@ class CheckpointsOfKind(Generic[R]):
     def _read(self, path: Path) -> R | None:
         try:
             content = unsealed(path.read_bytes())
-        except OSError:  # not there
+        except OSError:  # no such file
             return None
-        if content is None:  # torn, or no longer what was written
+        if content is None:  # incomplete or changed file
             return None
         with np.load(io.BytesIO(content)) as file:
             return self._codec.result(dict(file))

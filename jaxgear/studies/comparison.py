@@ -1,4 +1,4 @@
-"""The designs that a study compares: unmodified, rule-based, that of the file or the optimum of its variables."""
+"""Designs that a study compares: unmodified, rule-based, and the design of the file or the optimum of its variables."""
 
 import dataclasses
 
@@ -23,20 +23,20 @@ _POSITIONS, _PAIRS = "positions of the mesh", "pairs of the mesh"  # no names of
 
 
 def search_of(design: DesignFile, *, quick: bool) -> Search | None:
-    """The search that the file asks for; None where its modifications are numbers and it names no method."""
+    """Search for the optimum of the file; None if the file has no variables and no method that works without them."""
     if design.bounds or optimize_of(design).method in METHODS_WITHOUT_VARIABLES:
         return Search.of(design, quick=quick)
     return None
 
 
 def first_mesh(design: DesignFile, torque: float, *, quick: bool) -> Mesh:
-    """The mesh on which a search begins, up to a torque [N m]."""
+    """Mesh at the start of a search, with pairs of teeth for loads up to a torque [N m]."""
     size = design.resolution(torque)
     return jax.block_until_ready(design.mesh(coarse(size) if quick else size))
 
 
 def rule_based(design: DesignFile) -> AbstractModification:
-    """The relief of ISO 6336-1 for both tips."""
+    """Tip relief of ISO 6336-1, the same for both gears."""
     pair, factor = design.pair(), optimize_of(design).application_factor
     path = pair_geometry(explicit(pair)).path_of_contact
     return _iso_relief(pair, path, np.asarray(design.torque), np.asarray(factor))
@@ -56,15 +56,15 @@ def compared(
     *,
     quick: bool = False,
 ) -> tuple[Mesh, dict[str, Modifications]]:
-    """The designs by their names, and the mesh on which they are compared, up to a torque [N m].
+    """Mesh for a comparison of designs, and the designs (pinion, wheel) by name.
 
     Args:
-        design: the design file.
-        torque: largest of interest [N m].
-        search: for the optimum; None for none.
-        checkpoints: where what a search has found is kept; None keeps nothing.
-        stages: told what goes on; None for silence.
-        quick: on coarse positions.
+        design: design file.
+        torque: largest torque of the comparison [N m].
+        search: search for the optimum; None for the modification of the file.
+        checkpoints: checkpoints of the search; None to store nothing.
+        stages: progress of the study; None for no messages.
+        quick: True for coarse positions.
     """
     stages = Stages() if stages is None else stages
     stages.begin("preparing the mesh")
@@ -93,13 +93,13 @@ def sought(
     *,
     quick: bool,
 ) -> tuple[Mesh, Modifications]:
-    """The mesh on which a search has ended, and what it has found, now or before the command was interrupted.
+    """Final mesh and modifications (pinion, wheel) of a search, computed or loaded from a checkpoint.
 
     Args:
-        design: the design file.
-        name: of what the search gives; one search of a file has it.
-        search: to be run.
-        mesh: on which it begins.
+        design: design file.
+        name: name of the design that the search finds, unique among the searches of a file.
+        search: the search.
+        mesh: mesh at its start.
         checkpoints, stages, quick: as for `compared`.
     """
 
@@ -107,10 +107,10 @@ def sought(
         optimum = search(mesh, stages.step)
         return optimum.compromise if isinstance(optimum, Front) else optimum
 
-    if search.method in METHODS_WITHOUT_VARIABLES:  # there are no few numbers to keep
+    if search.method in METHODS_WITHOUT_VARIABLES:  # free-form flanks have no parameters to store
         optimum = found()
         return optimum.mesh, (optimum.pinion, optimum.wheel)
-    lowest = design.design({name: low for name, (low, _) in design.bounds.items()})  # with what files hold
+    lowest = design.design({name: low for name, (low, _) in design.bounds.items()})  # with contents of data files
     asked = name, quick, design.says, design.tables.get("lubricant"), design.tables.get("strength")
     kept = checkpoints.of(NamedArrays())((mesh, lowest, asked), lambda: _numbers(found()))
     numbers = {name: float(value) for name, value in kept.items()}
@@ -122,6 +122,6 @@ def sought(
 
 
 def _numbers(optimum: Optimum) -> dict[str, float]:
-    """Numbers that give design and mesh of an optimum again."""
+    """Numbers from which design and mesh of an optimum can be restored."""
     sizes = optimum.mesh.resolution
     return {**optimum.parameters, _POSITIONS: sizes.positions, _PAIRS: sizes.chosen_pairs}

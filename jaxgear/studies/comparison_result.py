@@ -29,16 +29,16 @@ from .summary_data import fields_data, finding_data, flanks_data, key_of, model,
 
 @dataclass(frozen=True)
 class ComparisonResult(AbstractStudyResult):
-    """Designs side by side.
+    """Result of a comparison of designs.
 
     Attributes:
-        design: the design file.
-        quick: whether positions are coarse and torques few.
-        mesh: on which the designs are evaluated.
-        torques: over the range of the file, at which they are evaluated [N m], shape (torques,).
-        evaluations: designs by their names, the first of which is unmodified.
-        unusual: findings of every design, by its name.
-        unverified: why nothing is verified by finite elements; "" where it is, or is not asked for.
+        design: design file.
+        quick: True for coarse positions and few torques.
+        mesh: mesh of the evaluations.
+        torques: torques of the evaluations, over the range of the file [N m], shape (torques,).
+        evaluations: evaluations by the name of the design, the unmodified design first.
+        unusual: findings by the name of the design.
+        unverified: reason for no verification by finite elements; "" if verified or not requested.
     """
 
     design: DesignFile
@@ -50,7 +50,7 @@ class ComparisonResult(AbstractStudyResult):
     unverified: str
 
     def inputs(self) -> dict[str, Any]:
-        """Load, tables, tolerances, model and array sizes."""
+        """Load, tolerances, model, array sizes and further tables of the design file, as plain data."""
         file = self.design
         tables = {name: part for name in ("lubricant", "strength") if (part := file.tables.get(name)) is not None}
         return {
@@ -65,9 +65,9 @@ class ComparisonResult(AbstractStudyResult):
         }
 
     def summary(self) -> dict[str, Any]:
-        """Every number of the gears and designs."""
+        """Numbers of the gears and of every design, as plain data."""
         file, mesh, evaluations = self.design, self.mesh, self.evaluations
-        pair = mesh.pair.coast if file.coast else mesh.pair  # of the hands that the file has
+        pair = mesh.pair.coast if file.coast else mesh.pair  # with the hands of helix of the file
         ppte = {UnitKey(name, "um"): evaluation.ppte for name, evaluation in evaluations.items()}
         geometry = gears(file)["geometry"]
         return {
@@ -115,7 +115,7 @@ class ComparisonResult(AbstractStudyResult):
         return {key: each for key, each in found.items() if isinstance(each, Part)}
 
     def figures(self) -> Iterator[Figure]:
-        """Designs, and their scatter over manufactured gears."""
+        """Figures of the designs, and of their scatter over manufactured gears."""
         yield from side_by_side.figures(self.design, self.mesh, self.evaluations, self.torques)
         yield from manufactured.figures(self.evaluations)
 
@@ -126,11 +126,11 @@ class ComparisonResult(AbstractStudyResult):
             yield from part.tables
 
     def verdict(self) -> Iterator[str]:
-        """The grid and its error, notes, and how the gears are mounted."""
+        """Lines on the grid and its error, notes, and the mounting of the gears."""
         yield from (*side_by_side.grid(self.evaluations), *self.notes(), mounting(self.design))
 
     def notes(self) -> Iterator[str]:
-        """Manufactured gears, coast flanks, coarse positions and missing verification in words."""
+        """Lines on manufactured gears, coast flanks, coarse positions and a missing verification."""
         yield from manufactured.lines(self.design, self.evaluations)
         if self.design.coast:
             yield "coast flanks: contact runs from pinion tip to pinion root, positions count against the rotation"
@@ -140,15 +140,15 @@ class ComparisonResult(AbstractStudyResult):
             yield f"not verified by finite elements: {self.unverified}"
 
     def findings(self) -> Iterator[str]:
-        """Values of the designs out of the usual range."""
+        """Lines on values of the designs outside the usual range."""
         return side_by_side.finding_lines(self.unusual)
 
     def failures(self) -> Iterator[str]:
-        """Results that did not converge."""
+        """Lines on results that have not converged."""
         yield from (*side_by_side.failures(self.evaluations), *manufactured.failures(self.evaluations))
 
     def checks(self) -> Iterator[tuple[str, str]]:
-        """Convergence of all designs, and their numbers by finite elements."""
+        """Checks of a report: convergence of all designs, and their values by finite elements."""
         for name, evaluation in self.evaluations.items():
             yield f"{name}: converged", text(evaluation.metrics["converged"])
             yield f"{name}: failed torques [N m]", text(evaluation.failed_torques)
@@ -189,11 +189,11 @@ def _reduction(evaluations: side_by_side.Evaluations) -> float:
     return 100 * (1 - side_by_side.main(evaluations).metrics["ppte_um"] / before) if before else 0.0
 
 
-_DERIVED = "tip_diameter", "tip_form_diameter", "bore_diameter"  # follow from other numbers where none are given
+_DERIVED = "tip_diameter", "tip_form_diameter", "bore_diameter"  # computed from other numbers if not given
 
 
 def _gear(gear: Gear, geometry: Mapping[str, Any]) -> dict[str, Any]:
-    """Every number of a gear, with those that follow from others where the file gives none."""
+    """Numbers of a gear, with computed values where the file gives none."""
     data: dict[str, Any] = {"bore_given": gear.bore_diameter is not None}
     for part in (gear, gear.material):
         for name, field in fields_of(type(part)).items():
@@ -203,7 +203,7 @@ def _gear(gear: Gear, geometry: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _drawn(given: Mapping[str, Any]) -> dict[str, Any]:
-    """Drawing data of the file with `drawn_` before tooth thickness keys, to tell them from the numbers of the gear."""
+    """Drawing data of the file; tooth thickness keys get the prefix `drawn_`, distinct from the numbers of the gear."""
     return {
         UnitKey(f"drawn_{key.name}", key.unit)
         if isinstance(key, UnitKey) and key.startswith("tooth_thickness")

@@ -1,4 +1,4 @@
-"""The speed study: from a design file to the vibration of its designs over the speed."""
+"""Speed study: vibration of the designs of a design file over the speed."""
 
 import math
 from collections.abc import Iterator, Mapping
@@ -38,7 +38,7 @@ _QUICK_SPEEDS = 24
 _POINTS = 400  # of a branch
 _STEP, _QUICK_STEP = 0.02, 0.06  # first step along a branch, of `follow_orbits`: about 330 points and 190
 _SAME = 1e-3  # relative difference of dynamic factors of one orbit, by two integrations
-_BESIDE = 4  # speeds on either side of a peak that are gone through again on a finer grid
+_BESIDE = 4  # number of speeds on each side of a peak that are repeated with a finer mesh force
 
 
 def branches_of(
@@ -77,7 +77,7 @@ def _followed(
 
 
 def _on(branch: Branch, response: SpeedResponse, place: int) -> bool:
-    """Whether a branch passes through the steady state of a run, by its neighbours there."""
+    """True if a branch passes through the steady state of a run at a speed, interpolated between branch points."""
     if branch.orbits.periods != int(response.period[place]):
         return False
     at, factors = np.asarray(branch.mesh_frequency, float), np.asarray(branch.orbits.dynamic_factor, float)
@@ -90,7 +90,7 @@ def _on(branch: Branch, response: SpeedResponse, place: int) -> bool:
 def _grid_change(result: DynamicsResult) -> dict[str, dict[str, float]]:
     """Change of the largest dynamic factor of every design at twice the positions of the mesh force.
 
-    The steps of the integrator are doubled too, as they meet no more positions than their number."""
+    The steps of the integrator are doubled too: they cannot resolve more positions than their number."""
     settings = result.settings
     finer = replace(settings, positions=2 * settings.positions)
     last = len(settings.mesh_frequencies)
@@ -126,7 +126,7 @@ def _steps(
     oscillators: Mapping[str, Mapping[float, Oscillator]],
     natural: Mapping[str, Mapping[float, Natural]],
 ) -> tuple[int, ...]:
-    """As many as the stiffest oscillator needs at every speed: one compiled program serves all."""
+    """Steps per mesh cycle that the stiffest oscillator needs at every speed, so that one program serves all."""
     if settings.steps is not None:
         lowest = float(settings.mesh_frequencies[0])
         highest = max(float(of.highest) for several in natural.values() for of in several.values())
@@ -144,14 +144,15 @@ def _steps(
 class DynamicsStudy(AbstractStudy[DynamicsResult]):
     """Run the pair through the speeds of the table `dynamics`, up and down, under several torques.
 
-    Compares the unmodified pair, the rule-based tip relief of ISO 6336-1, and the modification of the design file or
-    the optimum of its variables. What an interrupted command has found is kept: the same command goes on from there.
+    The command compares the unmodified pair, the rule-based tip relief of ISO 6336-1, and the modification of the
+    design file or the optimum of its variables. An interrupted command resumes from its stored results when it is
+    repeated.
 
     Attributes:
         settings: speeds and vibrating masses.
         torques: torques on the pinion [N m], ascending.
         run_up: duration of a run-up [s]; None for no run-up.
-        search: for the optimum of the file; None where its modifications are numbers.
+        search: search for the optimum of the file; None if its modifications are numbers.
     """
 
     name: ClassVar = "dynamics"
@@ -172,7 +173,7 @@ class DynamicsStudy(AbstractStudy[DynamicsResult]):
         return cls(design, quick, *asked, search_of(design, quick=quick))
 
     def work_out(self, checkpoints: Checkpoints, stages: Stages) -> DynamicsResult:
-        """All runs of all designs under all torques, and the branches of one, a quick study its first branch."""
+        """Compute all runs of all designs at all torques, and the branches of one design (quick: its first branch)."""
         highest = max(self.design.torque, *self.torques)
         found = compared(self.design, highest, self.search, checkpoints, stages, quick=self.quick)
         result = self._responses(*found, checkpoints, stages)

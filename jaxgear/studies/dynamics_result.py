@@ -46,7 +46,7 @@ _CLOSER = {
     "phase_portrait": "Dynamic transmission error and its rate at the speed of the largest dynamic factor; marked once "
     "per mesh cycle. The abscissae differ from panel to panel.",
 }
-_FAR = 20.0  # times the natural frequency, above which, or below its reciprocal, nothing of a mesh resonates
+_FAR = 20.0  # ratio of speed range and natural frequency, or its reciprocal, beyond which no mesh order resonates
 _RUNS = {UP: "rising", DOWN: "falling", KICKED: "falling, kicked"}
 _PANEL, _HEIGHT, _WIDE = 92.0, 94.0, 130.0  # [mm]
 
@@ -93,7 +93,7 @@ class DynamicsResult(AbstractStudyResult):
     grid_change: Mapping[str, Mapping[str, float]] = dataclasses.field(default_factory=dict)
 
     def rows(self) -> Iterator[_Run]:
-        """Design, torque, run and response of all runs."""
+        """Design, torque [N m], name of the run and response of all runs."""
         for name, of_torques in self.responses.items():
             for torque, runs in of_torques.items():
                 for run, response in runs.items():
@@ -101,7 +101,7 @@ class DynamicsResult(AbstractStudyResult):
 
     @property
     def torque(self) -> float:
-        """The torque next to the design torque [N m]."""
+        """Torque of the study nearest to the design torque [N m]."""
         return next_to_design(self.design, self.torques)
 
     def _records(self) -> tuple[Record[_Run], ...]:
@@ -136,14 +136,14 @@ class DynamicsResult(AbstractStudyResult):
         )
 
     def tables(self) -> Iterator[Table]:
-        """The peaks of every run."""
+        """Table of the peak values of every run."""
         rows = [(run[0], run) for run in self.rows()]
         table = table_of(self._records(), rows, f"{self.design.title}: largest values over the speed", "design")
         table.ends = tuple(place for place in range(len(rows) - 1) if rows[place][0] != rows[place + 1][0])
         yield table
 
     def verdict(self) -> Iterator[str]:
-        """The worst of every design over all runs and torques."""
+        """Lines on the largest dynamic factor of every design over all runs and torques."""
         worst = {
             name: max(peak(response, "dynamic_factor")[0] for runs in of_torques.values() for response in runs.values())
             for name, of_torques in self.responses.items()
@@ -171,7 +171,7 @@ class DynamicsResult(AbstractStudyResult):
             yield f"no periodic motion was found at {aperiodic} of {total} speeds: their numbers are of a recorded time"
 
     def _still_rising(self) -> Iterator[str]:
-        """A line for designs whose largest dynamic factor is that of the highest speed, below the natural frequency."""
+        """Line on designs with the largest dynamic factor at the highest speed, below the natural frequency."""
         highest = float(self.settings.mesh_frequencies[-1])
         rising = {
             name: None
@@ -185,7 +185,7 @@ class DynamicsResult(AbstractStudyResult):
             )
 
     def _far_from_resonance(self) -> Iterator[str]:
-        """A line where every speed is far above or below what can resonate: then a mass is likely to be wrong."""
+        """Line for speeds that are all far from resonance: a mass is likely to be wrong."""
         natural = self.natural_frequencies["unmodified"][self.torque]
         low, high = (float(self.settings.mesh_frequencies[place]) / natural for place in (0, -1))
         if low > _FAR or high < 1 / _FAR:
@@ -195,7 +195,7 @@ class DynamicsResult(AbstractStudyResult):
             )
 
     def _bodies(self) -> Iterator[str]:
-        """A line for gears whose bore is left open, which is another for the compliance than for the inertia."""
+        """Line on gears without a bore diameter, whose defaults for compliance and inertia differ."""
         settings, pair = self.settings, self.design.pair()
         given = ("pinion", pair.pinion, settings.pinion_inertia), ("wheel", pair.wheel, settings.wheel_inertia)
         for name, gear, inertia in given:
@@ -207,7 +207,7 @@ class DynamicsResult(AbstractStudyResult):
                 )
 
     def failures(self) -> Iterator[str]:
-        """A line for every design whose contact was not found at some DTE."""
+        """Line for every design whose contact has not converged at some DTE."""
         for name, of_torques in self.oscillators.items():
             bad = [f"{torque:g}" for torque, of in of_torques.items() if not bool(of.converged)]
             if bad:
@@ -231,7 +231,7 @@ class DynamicsResult(AbstractStudyResult):
         }
 
     def summary(self) -> dict[str, Any]:
-        """The runs of all designs."""
+        """Numbers of all runs by design, and their change on a finer grid, as plain data."""
         records = self._records()
         designs: dict[str, Any] = {name: {"runs": [], **flanks_data(*flanks)} for name, flanks in self.designs.items()}
         for run in self.rows():
@@ -251,7 +251,7 @@ class DynamicsResult(AbstractStudyResult):
         }
 
     def write(self, folder: Path) -> None:
-        """Every speed of every run as `responses.csv`, and every sample of every run-up as `run_up.csv`."""
+        """Write every speed of every run to `responses.csv`, and every sample of every run-up to `run_up.csv`."""
         orders = next(self.rows())[-1].orders
         of_orders = [f"force_order_{order:g}_{unit}" for unit in ("N", "dB_re_1uN") for order in orders]
         begin = "design", "torque_Nm", "speed", "mesh_frequency_Hz", "pinion_speed_rpm"
@@ -284,7 +284,7 @@ class DynamicsResult(AbstractStudyResult):
         return 60 / float(self.mesh.pair.pinion.teeth)
 
     def figures(self) -> Iterator[Figure]:
-        """Responses of all designs, and the first and the last design more closely."""
+        """Figures of the responses of all designs, and details of the first and the last design."""
         from .. import plot
 
         for field, caption in _OVER_SPEED.items():
@@ -364,7 +364,7 @@ class DynamicsResult(AbstractStudyResult):
 
 
 def next_to_design(design: DesignFile, torques: Sequence[float]) -> float:
-    """The torque of a study next to the design torque [N m]."""
+    """Torque of a study nearest to the design torque [N m]."""
     return min(torques, key=lambda torque: abs(torque - design.torque))
 
 
@@ -387,5 +387,5 @@ def _branch(branch: Branch) -> dict[str, Any]:
 
 
 def _called(runs: Mapping[str, SpeedResponse]) -> dict[str, SpeedResponse]:
-    """Runs by what figures say of them."""
+    """Runs by their names in figures."""
     return {_RUNS.get(name, name): response for name, response in runs.items()}

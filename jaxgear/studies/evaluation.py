@@ -38,24 +38,24 @@ _EXTREMES = "ppte_um", "force_excitation_N", "max_flank_pressure_MPa", "max_corn
 
 @dataclass(frozen=True)
 class Evaluation:
-    """One design.
+    """Evaluation of one design.
 
     Attributes:
-        pinion, wheel: its modifications.
+        pinion, wheel: modifications of pinion and wheel.
         cycle: mesh cycle at the design torque.
-        metrics: numbers at the design torque, by name and unit.
-        transmission_error: over the torques, shape (torques, positions) [um].
-        ppte: peak-to-peak transmission error over the torques [um].
-        objectives: what an optimization made small, by name and unit, of this design; empty without one.
-        grid_change: change of numbers at the design torque at twice the positions and, of helical gears, with slices
-            without end, by name and unit.
+        metrics: values of quantities at the design torque, by name and unit.
+        transmission_error: transmission error over the torques [um], shape (torques, positions).
+        ppte: peak-to-peak transmission error over the torques [um], shape (torques,).
+        objectives: values of the objectives of an optimization for this design, by name and unit; empty without one.
+        grid_change: change of the values at the design torque at twice the positions and, for helical gears,
+            extrapolated to infinitely many slices, by name and unit.
         failed_torques: torques without a converged contact solution [N m], the design torque included.
-        cause: why, in words: the most basic cause at all of them.
-        seconds: what finding and evaluating it took, without compilation of the latter [s].
+        cause: most basic reason at the failed torques, in words.
+        seconds: time for search and evaluation [s], without compilation of the evaluation.
         factors: of the rating by ISO 6336 at the design torque, by name and unit.
         verified: results with the finite-element structure; None where they were not computed.
-        face_load: face load factor over the torques; empty on one slice.
-        scatter: over manufactured gears; None where the file has no tolerances.
+        face_load: face load factor over the torques, shape (torques,); empty for one slice.
+        scatter: scatter over manufactured gears; None if the file has no tolerances.
     """
 
     pinion: AbstractModification
@@ -76,19 +76,19 @@ class Evaluation:
 
 
 def coarse(size: Resolution) -> Resolution:
-    """The array sizes of a quick run."""
+    """Array sizes of a quick run, with fewer positions."""
     return replace(size, positions=min(size.positions, _QUICK_POSITIONS))
 
 
 def torques_of(design: DesignFile, *, quick: bool) -> np.ndarray:
-    """Torques over the range of a design file [N m], at which its designs are evaluated."""
+    """Torques at which designs are evaluated, over the range of the design file [N m], shape (torques,)."""
     return np.linspace(*design.torque_range, _QUICK_TORQUES if quick else _TORQUES)
 
 
 def evaluation_of(
     file: DesignFile, mesh: Mesh, torques: np.ndarray, pinion: AbstractModification, wheel: AbstractModification
 ) -> Evaluation:
-    """Evaluates a design at the torque of its file and at further ones [N m]."""
+    """Evaluate a design at the torque of its file and at further torques [N m]."""
     every = np.concatenate([[file.torque], torques])
     over_torques(mesh, every[:1], pinion=pinion, wheel=wheel)  # compiles, where it has to
     began = time.perf_counter()
@@ -124,7 +124,8 @@ def grid_change(
 ) -> dict[str, float]:
     """Change of the extremes of a cycle at twice the positions of its mesh, by name and unit.
 
-    The error of the slices of helical gears is added, see `slices_left`, but never so that both cancel.
+    For helical gears the error of the slices is added (see `slices_left`), with equal signs so that the two do not
+    cancel.
     """
 
     def solved(mesh: Mesh) -> MeshCycle:
@@ -144,7 +145,7 @@ def grid_change(
 
 
 def grid_of(sizes: Resolution, *, helical: bool) -> str:
-    """Positions and, of helical gears, slices in words."""
+    """Number of positions and, for helical gears, of slices, in words."""
     slices = f" and {sizes.slices} slices, whose error is estimated from a third of them" if helical else ""
     return f"{sizes.positions} positions{slices}"
 
@@ -160,18 +161,18 @@ def _extremes(*cycles: MeshCycle) -> dict[str, float]:
 
 
 def face_change(before: MeshCycle, after: MeshCycle) -> dict[str, float]:
-    """Change of K_Hbeta and extremes from a cycle to one on other slices, by name and unit."""
+    """Change of K_Hbeta and of extremes between two mesh cycles with different slices, by name and unit."""
     found = [{"face_load_factor": float(_face_load([cycle])[0]), **_extremes(cycle)} for cycle in (before, after)]
     return {name: found[1][name] - value for name, value in found[0].items()}
 
 
 def grid_lines(grid: str, changes: Mapping[str, Mapping[str, float]], more: str = "") -> Iterator[str]:
-    """How fine a grid was, and what twice that would change, a quantity a line; `changes` by the name of the design."""
+    """Lines on a grid and on the changes on a finer grid, one per quantity; `changes` by the name of the design."""
     said = [more] * bool(more)
     for metric in next(iter(changes.values())):
         quantity = quantities[metric]
         unit = f" {quantity.unit}".rstrip()
-        # the same extreme: at a position that both grids have
+        # no change: the extreme lies at a position of both grids
         each = (
             f"{name} by {by:+.2g}{unit}" if (by := change[metric]) else f"{name} not"
             for name, change in changes.items()
@@ -208,6 +209,6 @@ def _factor(cycle: MeshCycle):
 
 @program
 def _numbers(cycle: MeshCycle, further: tuple[Quantity, ...], settings: tuple[AbstractSettings, ...]):
-    """The numbers of a cycle and some quantities with settings, and the factors of ISO 6336."""
+    """Summary of a mesh cycle with further quantities that have settings, and rating factors of ISO 6336."""
     analysis = Analysis(cycle, None, settings)
     return summary(cycle) | {quantity.key: quantity(analysis) for quantity in further}, rating_factors(cycle)

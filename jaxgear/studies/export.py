@@ -1,4 +1,4 @@
-"""The study of an export: from a design file to tables for programs of rotor and multibody dynamics."""
+"""Export study: tables of a design for programs of rotor and multibody dynamics."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -26,12 +26,13 @@ _QUICK_POSITIONS = 64  # of the force map
 class ExportStudy(AbstractStudy["ExportResult"]):
     """Write mesh stiffness, transmission error and mesh force as files for rotor and multibody programs.
 
-    Those of the modification of the design file, of the optimum of its variables, or of the unmodified pair: stiffness
-    and transmission error over phase and torque, orders of the transmission error, force over phase and dynamic
-    transmission error, as CSV and all as mesh.npz. Units, signs and axes stand in the files.
+    The exported design is the modification of the design file, the optimum of its variables, or the unmodified pair.
+    The files hold stiffness and transmission error over phase and torque, orders of the transmission error, and force
+    over phase and dynamic transmission error, as CSV and together as mesh.npz. Units, signs and axes are described in
+    the files.
 
     Attributes:
-        search: for the optimum of the file; None where its modifications are numbers.
+        search: search for the optimum of the file; None if its modifications are numbers.
     """
 
     name: ClassVar = "export"
@@ -44,7 +45,7 @@ class ExportStudy(AbstractStudy["ExportResult"]):
         return cls(design, quick, search_of(design, quick=quick))
 
     def work_out(self, checkpoints: Checkpoints, stages: Stages) -> "ExportResult":
-        """The tables over the torques of the file."""
+        """Compute the tables over the torques of the file."""
         design = self.design
         mesh, designs = compared(
             design, max(torques_of(design, quick=True)), self.search, checkpoints, stages, quick=self.quick
@@ -61,13 +62,13 @@ class ExportStudy(AbstractStudy["ExportResult"]):
 
 @dataclass(frozen=True)
 class ExportResult(AbstractStudyResult):
-    """Tables of one design.
+    """Exported tables of one design.
 
     Attributes:
-        design: the design file.
-        name: of the design.
-        flanks: its modifications (pinion, wheel).
-        mesh: its tables.
+        design: design file.
+        name: name of the design.
+        flanks: modifications (pinion, wheel) of the design.
+        mesh: tables of the design.
     """
 
     assumptions: ClassVar = ("The mesh force is quasi-static and made for the torque of the design file.",)
@@ -78,7 +79,7 @@ class ExportResult(AbstractStudyResult):
     mesh: MeshTables
 
     def tables(self) -> Iterator[Table]:
-        """Numbers at the torque of the file and at both ends of its range."""
+        """Table of values at the torque of the file and at both ends of its range."""
         header = "torque\n[N m]", "mean TE\n[um]", "PPTE\n[um]", "mesh order\n[um]", "mean stiffness\n[N/um]"
         result, mesh = Table(header, title=f"{self.design.title}: {self.name} design"), self.mesh
         for torque in sorted({mesh.torques[0], mesh.torque, mesh.torques[-1]}):
@@ -89,7 +90,7 @@ class ExportResult(AbstractStudyResult):
         yield result
 
     def failures(self) -> Iterator[str]:
-        """A line where the contact was not found somewhere."""
+        """Line for a contact that has not converged at some position."""
         if not self.mesh.converged:
             cause = reason(self.mesh.status)
             help_ = "Raise resolution.newton_steps or resolution.pairs."
@@ -104,7 +105,7 @@ class ExportResult(AbstractStudyResult):
         }
 
     def summary(self) -> dict[str, Any]:
-        """Scalars of the tables; the tables are files of their own."""
+        """Mesh frequency [Hz], base radii [mm], inertias [kg m2], file names and modifications, as plain data."""
         mesh, speed = self.mesh, self.design.speed
         data = {} if speed is None else {UnitKey("mesh_frequency", "Hz"): float(mesh.teeth[0] * speed / 60)}
         return data | {
@@ -116,6 +117,6 @@ class ExportResult(AbstractStudyResult):
         }
 
     def write(self, folder: Path) -> None:
-        """The tables, unless a contact did not converge."""
+        """Write the tables as files, unless a contact has not converged."""
         if self.mesh.converged:
             self.mesh.write(folder)

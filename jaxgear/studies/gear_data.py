@@ -1,4 +1,4 @@
-"""The geometry of a pair as an engineer lists it, and as a drawing says it."""
+"""Geometry data of a pair, and data of its drawings, for tables and summaries."""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
@@ -79,7 +79,7 @@ Scalar = Float[Array, ""]
 
 
 def chosen(file: DesignFile) -> tuple[Any, ...]:
-    """Teeth spanned and ball diameter of either gear where the file names them, and its flank tolerance class."""
+    """Teeth spanned, ball diameter [mm] (None if not in the file) and flank tolerance class of either gear."""
     classes = quality_classes(file) or (None, None)
     given = (file.drawn[name] for name in ("pinion", "wheel"))
     measured = ([np.asarray(one[key], float) if key in one else None for key in _CHOSEN] for one in given)
@@ -89,7 +89,7 @@ def chosen(file: DesignFile) -> tuple[Any, ...]:
 def numbers(
     gear: Gear, teeth: Given | None, ball: Given | None, quality: ToleranceClass | None
 ) -> tuple[tuple[Scalar, ...], ...]:
-    """`_MEASURES`, and `_DEVIATIONS` where the gear has a class; to be traced."""
+    """Values of `_MEASURES`, and of `_DEVIATIONS` for a gear with a tolerance class; traceable."""
     upper = gear.tooth_thickness_allowance
 
     def measured(allowance):
@@ -103,7 +103,7 @@ def numbers(
 
 
 def drawing(found: tuple[tuple[Any, ...], ...], quality: ToleranceClass | None) -> dict[str, Any]:
-    """`numbers` of a gear by name and unit; measures that would miss the involute are left out."""
+    """Drawing data of a gear from its `numbers`, by name and unit; without measures that do not touch the involute."""
     measured, deviations = ([np.asarray(number).item() for number in several] for several in found)
     data: dict[str, Any] = {key: value for key, value in zip(_MEASURES, measured) if np.isfinite(value)}
     data[_MEASURES[0]] = int(data[_MEASURES[0]])
@@ -113,7 +113,7 @@ def drawing(found: tuple[tuple[Any, ...], ...], quality: ToleranceClass | None) 
 
 
 def gear_tables(data: Mapping[str, Mapping[str, Any]]) -> list[Table]:
-    """`gears` as tables: both gears side by side, the pair, and what stands on a drawing."""
+    """Tables of the data of `gears`: both gears side by side, the pair, and the drawing data."""
     geometry, drawn = data["geometry"], data["drawing"]
     both = {name: geometry[name] for name in ("pinion", "wheel")}
     known = [key for key in (*_MEASURES, _CLASS, *_DEVIATIONS.values()) if any(key in gear for gear in drawn.values())]
@@ -126,14 +126,14 @@ def gear_tables(data: Mapping[str, Mapping[str, Any]]) -> list[Table]:
 
 
 def rating_page(designs: Mapping[str, Factors]) -> Chapter:
-    """The factors of ISO 6336 of several designs, side by side."""
+    """Chapter with the rating factors of ISO 6336 of several designs side by side."""
     return Chapter("Rating by ISO 6336", tables=[_side_by_side(FACTORS, designs, "", _RATING_NOTE)])
 
 
 def _side_by_side(
     keys: Sequence[UnitKey], columns: Mapping[str, Mapping[str, Any]], title: str, note: str = ""
 ) -> Table:
-    """Numbers of several things, a line each."""
+    """Table of numbers, one line per key and one column per name."""
     rows = tuple((key.heading, *(text(of.get(key)) for of in columns.values())) for key in keys)
     return Table(("", *columns), rows, title, note)
 
@@ -216,10 +216,10 @@ def gears(file: DesignFile) -> dict[str, dict[str, dict[str, Any]]]:
     """Geometry of both gears and the pair, and drawing data of the gears, as in every `summary.json`.
 
     Points of the path of contact are positions from the pitch point C, positive towards the tip of the pinion. The
-    usable involute runs from the root form diameter to the tip form diameter, and the mate touches it from the active
-    root diameter d_Nf to the active tip diameter d_Na, the tip form diameter but where the mate is undercut. Of helical
-    gears module and pressure angle are normal ones, and the base pitch and the backlash on the line of action
-    transverse ones.
+    usable involute runs from the root form diameter to the tip form diameter. The active part runs from the active root
+    diameter d_Nf to the active tip diameter d_Na, which is the tip form diameter unless the mate is undercut. For
+    helical gears, module and pressure angle are those of the normal section; base pitch and backlash on the line of
+    action are those of the transverse section.
     """
     # gears without backlash have it up to rounding, which is no -0
     choices = chosen(file)
@@ -237,7 +237,7 @@ def gears(file: DesignFile) -> dict[str, dict[str, dict[str, Any]]]:
 
 
 def mounting(file: DesignFile) -> str:
-    """Line on the bores, the centre distance, the backlash and full root radii of the gears."""
+    """Line on bores, centre distance, backlash and full root radii of the gears."""
     shape = gears(file)["geometry"]
     texts = []
     for name, gear in (("pinion", file.pair().pinion), ("wheel", file.pair().wheel)):
@@ -258,7 +258,7 @@ def mounting(file: DesignFile) -> str:
 
 
 def _listed(pair: GearPair) -> tuple[dict[UnitKey, Callable[..., Any]], dict[UnitKey, Callable[..., Any]]]:
-    """Numbers of a gear and of the pair."""
+    """Keys and functions of the numbers of a gear and of the pair."""
     return (_GEAR, _PAIR) if pair.is_spur else (_GEAR | _HELICAL_GEAR, _PAIR | _HELICAL_PAIR)
 
 

@@ -22,7 +22,7 @@ _QUICK_PAIRS = 16
 def scattered(
     design: DesignFile, mesh: Mesh, evaluations: Evaluations, gears: ManufacturedGears
 ) -> dict[str, Evaluation]:
-    """The evaluations with their scatter over manufactured gears, the same for all designs."""
+    """Evaluations with their scatter over manufactured gears; all designs get the same samples."""
     of = mesh, design.torque, gears
     return {
         name: replace(found, scatter=monte_carlo(*of, pinion=found.pinion, wheel=found.wheel))
@@ -31,7 +31,7 @@ def scattered(
 
 
 def lines(design: DesignFile, evaluations: Evaluations) -> Iterator[str]:
-    """The main design in words; nothing without a table [tolerance]."""
+    """Lines on the scatter of the main design; none without a table [tolerance]."""
     found = main(evaluations).scatter
     if found is not None:
         yield (
@@ -41,7 +41,7 @@ def lines(design: DesignFile, evaluations: Evaluations) -> Iterator[str]:
 
 
 def failures(evaluations: Evaluations) -> Iterator[str]:
-    """A line for every design of which manufactured pairs have failed."""
+    """Line for every design with manufactured pairs that have not converged."""
     for name, scatter in _scatters(evaluations).items():
         if scatter.failed:
             count = f"{scatter.failed} of {scatter.ppte.shape[0]}"
@@ -59,7 +59,7 @@ _RECORDS: tuple[Record[Scatter], ...] = (
 
 
 def pages(design: DesignFile, evaluations: Evaluations) -> Iterator[Chapter]:
-    """The part of the report about robustness; nothing without a table [tolerance]."""
+    """Chapter of a report on robustness; none without a table [tolerance]."""
     scatters = _scatters(evaluations)
     if scatters:
         title = f"PPTE over manufactured pairs, {design.torque:g} N m on the pinion"
@@ -93,12 +93,12 @@ def _pairs(design: DesignFile, scatter: Scatter) -> str:
 
 
 def gears_of(design: DesignFile, *, quick: bool) -> ManufacturedGears | None:
-    """The manufactured pairs that a design is judged by; None without the table [tolerance]."""
+    """Manufactured gears of a design file; None without the table [tolerance]."""
     return manufactured_of(design, _QUICK_PAIRS if quick else None)
 
 
 def left_out(design: DesignFile, why: str = "") -> str:
-    """That an analysis is of nominal gears though the file has tolerances; "" where it has none."""
+    """Message that an analysis ignores the table [tolerance] of the file; "" if the file has none."""
     if "tolerance" not in design.tables:
         return ""
     return "[tolerance] is not part of this analysis, the gears are nominal" + f" ({why})" * bool(why)
@@ -110,7 +110,7 @@ def tolerances(design: DesignFile) -> dict[str, Any]:
 
 
 def pairs_in_words(design: DesignFile, count: int) -> str:
-    """How many manufactured pairs of which class."""
+    """Number and quality class of manufactured pairs, in words."""
     classes = design.tables["tolerance"].quality_class
     named = "/".join(map(str, classes)) if isinstance(classes, list) else str(classes)
     return f"{count} manufactured pairs of quality class {named}"

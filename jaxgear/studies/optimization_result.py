@@ -36,13 +36,13 @@ _NO_RATIO = ("degC",)  # units whose zero is a convention
 
 @dataclass(frozen=True)
 class Judged:
-    """A number by which designs are compared.
+    """Quantity by which designs are compared.
 
     Attributes:
-        of: the quantity.
-        label: in words, with the measure over several cases.
-        values: by the name of the design.
-        verified: the same with the finite-element structure; empty where that was not asked for.
+        of: quantity.
+        label: name in words, with the measure over several cases.
+        values: values by the name of the design.
+        verified: values with the finite-element structure; empty if not requested.
     """
 
     of: Quantity
@@ -63,7 +63,7 @@ class Judged:
         return f"{abs(percent):.1f} % {'more' if percent > 0 else 'less'}{worse} than {than}"
 
     def row(self, values: Mapping[str, float]) -> str:
-        """The main design, which is the last, against the first and against those between."""
+        """Comparison in words of the main design, which is the last, with the first and with the others."""
         form = self.of.form
         (first, before), *others, (_, after) = values.items()
         changes = [self.change(before, after, first)]
@@ -73,11 +73,11 @@ class Judged:
 
 
 def gains(evaluations: side_by_side.Evaluations, problem: Problem | None) -> Rows:
-    """Rows of label and text: the objectives, then PPTE where it is none of them, each by finite elements too.
+    """Rows (label, text) of the gains: all objectives, PPTE if it is not an objective, and values by finite elements.
 
     Args:
-        evaluations: designs by their names, the first of which is unmodified.
-        problem: by whose measure they were judged; None for PPTE alone.
+        evaluations: evaluations by the name of the design, the unmodified design first.
+        problem: problem with the objectives; None for PPTE alone.
     """
     main = side_by_side.main_name(evaluations)
     compared = {name: found for name, found in evaluations.items() if not name.startswith("as ")}
@@ -103,12 +103,12 @@ def _numbers(evaluations: side_by_side.Evaluations, problem: Problem | None) -> 
         yield Judged(ppte, ppte.words, values, verified if several else {})
 
 
-COMPROMISE = "compromise"  # what the design of a front is called that the run shows
-_SHOWN_PARAMETERS = 6  # more columns than these are for a file
+COMPROMISE = "compromise"  # name of the design of a front that is reported
+_SHOWN_PARAMETERS = 6  # with more parameters the columns are only written to a file
 
 
 def others_of(front: Front, evaluations: side_by_side.Evaluations) -> dict[str, np.ndarray]:
-    """Values of the objectives of the designs that the front is compared with, by their names."""
+    """Objectives of the designs that are compared with the front, by name, shape (objectives,)."""
     return {
         name: np.asarray(list(found.objectives.values()))
         for name, found in evaluations.items()
@@ -117,7 +117,13 @@ def others_of(front: Front, evaluations: side_by_side.Evaluations) -> dict[str, 
 
 
 def front_table(front: Front, evaluations: side_by_side.Evaluations, of_variables: Mapping[str, str]) -> Table:
-    """All designs of a front, with the others below; variables with their units."""
+    """Table of the designs of a front, followed by the designs it is compared with.
+
+    Args:
+        front: Pareto front.
+        evaluations: evaluations by the name of the design.
+        of_variables: units by the name of the variable.
+    """
     title = f"Pareto front, {len(front.values)} designs, all in front.csv"
     names = list(front.parameters) if len(front.parameters) <= _SHOWN_PARAMETERS else []
     objectives = () if front.compromise.problem is None else front.compromise.problem.objectives
@@ -134,12 +140,12 @@ def front_table(front: Front, evaluations: side_by_side.Evaluations, of_variable
 
 
 def front_rows(front: Front, signs: Sequence[int], evaluations: side_by_side.Evaluations) -> Rows:
-    """Rows on the compromise of a front, and on the designs of the front that beat the other designs.
+    """Rows (label, text) on the compromise of a front, and on the designs of the front that dominate other designs.
 
     Args:
-        front: the front.
-        signs: of the objectives, 1 where small values are the better ones, else -1.
-        evaluations: designs by their names.
+        front: Pareto front.
+        signs: sign of every objective, 1 if smaller values are better, else -1.
+        evaluations: evaluations by the name of the design.
     """
     yield COMPROMISE, "the design of the front whose worst distance from the best of each objective is least"
     for name, values in others_of(front, evaluations).items():
@@ -151,16 +157,16 @@ def front_rows(front: Front, signs: Sequence[int], evaluations: side_by_side.Eva
 
 _NOTHING = "nothing, the involute stays"
 _DIGITS = {"um": ".2f", "mm": ".3f"}
-_MOST = 4  # numbers of a curve that are written out
+_MOST = 4  # most numbers of a curve that are printed
 
 
 def to_grind(mesh: Mesh, pinion: AbstractModification, wheel: AbstractModification, design: str = "") -> Rows:
-    """Rows of gear and text, one for every part of both modifications.
+    """Rows (gear, text) of the modifications to grind, one for every part of both modifications.
 
     Args:
         mesh: prepared mesh.
         pinion, wheel: modifications of concrete numbers.
-        design: what they are called, where several designs are listed.
+        design: name of the design, if several designs are listed.
     """
     for gear, side, modification in zip(("pinion", "wheel"), mesh.sides, (pinion, wheel)):
         parts = [_part(part, side, modification) for part in describe(modification)] or [_NOTHING]
@@ -168,7 +174,7 @@ def to_grind(mesh: Mesh, pinion: AbstractModification, wheel: AbstractModificati
 
 
 def _under(label: str, lines: Iterable[str]) -> Rows:
-    """Rows of which the first has a label."""
+    """Rows (label, text) with the label in the first row only."""
     return zip(chain((label,), repeat("")), lines)
 
 
@@ -231,7 +237,7 @@ _LIMITED = {"corner pressure": "max_corner_pressure", "flank pressure": "max_fla
 
 
 def _overloads(unusual: Iterable[Finding], optimum: Optimum) -> Rows:
-    """Rows about pressures that no flank endures, and how a search keeps below them."""
+    """Rows on contact pressures above the usual range, with the constraint that limits them."""
     for finding in unusual:
         name = _LIMITED.get(finding.key)
         if name is not None and name not in optimum.constraints:
@@ -240,7 +246,7 @@ def _overloads(unusual: Iterable[Finding], optimum: Optimum) -> Rows:
 
 
 def _rounding(file: DesignFile, optimum: Optimum) -> Rows:
-    """A row about the steps of the variables, and what they cost."""
+    """Row on the steps to which variables are rounded, and on the resulting change of the objective."""
     rounding = optimum.rounding
     if rounding is None:
         return
@@ -271,7 +277,7 @@ class OptimizationResult(ComparisonResult):
     searched_at: int
 
     def summary(self) -> dict[str, Any]:
-        """Every number of the gears and designs, and the optimum."""
+        """Numbers of the gears, of every design and of the optimum, as plain data."""
         optimum, projection, file = self.optimum, self.projection, self.design
         data = optimum.summary()
         data["parameters"] = {_with_unit(file, name): value for name, value in optimum.parameters.items()}
@@ -291,13 +297,13 @@ class OptimizationResult(ComparisonResult):
         return {**super().summary(), "optimum": data}
 
     def write(self, folder: Path) -> None:
-        """The flanks of all designs as `flanks.csv`, and a front as `front.csv`."""
+        """Write the flanks of all designs to `flanks.csv`, and a front to `front.csv`."""
         super().write(folder)
         if self.front is not None:
             write_front(folder / "front.csv", self.front)
 
     def figures(self) -> Iterator[Figure]:
-        """Designs, their scatter over manufactured gears, the optimum over all loads, and the search."""
+        """Figures of the designs, their scatter over manufactured gears, the optimum over all loads, and the search."""
         from .. import plot
 
         yield from super().figures()
@@ -316,7 +322,7 @@ class OptimizationResult(ComparisonResult):
             yield Figure.of(plot.iterations_transmission_error, optimum, mesh.phase)
 
     def headlines(self) -> Iterator[Table]:
-        """Modification to grind, gain, and checks of the result."""
+        """Tables of the modification to grind, the gain, and the checks of the result."""
         optimum, projection, evaluations = self.optimum, self.projection, self.evaluations
         name, best = side_by_side.main_name(evaluations), side_by_side.main(evaluations)
         rows = [*_overloads(self.unusual[name], optimum), *to_grind(optimum.mesh, best.pinion, best.wheel)]
@@ -340,19 +346,19 @@ class OptimizationResult(ComparisonResult):
         yield Table(("", ""), checks, "Checks of the result")
 
     def tables(self) -> Iterator[Table]:
-        """The designs side by side, and those of a front."""
+        """Table of the designs side by side, and of the designs of a front."""
         yield from super().tables()
         if self.front is not None:
             yield front_table(self.front, self.evaluations, self.design.units)
 
     def verdict(self) -> Iterator[str]:
-        """How the gears are mounted; the headlines say the rest."""
+        """Line on the mounting of the gears; the headlines contain the results."""
         yield mounting(self.design)
 
     def details(self) -> Iterator[str]:
         """The search: iterations, projection, first-order optimality and number of analyses."""
         optimum, front = self.optimum, self.front
-        if optimum.objective_name.endswith(PENALIZED):  # no other design pays it
+        if optimum.objective_name.endswith(PENALIZED):  # no other design has the penalty
             yield f"{optimum.objective_name}: {optimum.objective:.4g}"
         for step, state in enumerate(optimum.iterations):
             yield (

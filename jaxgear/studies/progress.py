@@ -1,4 +1,4 @@
-"""How far a study is, told to a callback."""
+"""Progress of a study, reported to a callback."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -6,13 +6,13 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Progress:
-    """How far a study is.
+    """Progress of a study.
 
     Attributes:
-        stage: what the study does now, in words.
-        done: how much of the stage is done, in the same unit as `total`; None when the stage begins.
-        total: how much there is to do; None where that is not known.
-        note: what comes next, or the best value so far, in words.
+        stage: name of the current stage.
+        done: number of steps done in the stage; None at its start.
+        total: number of steps of the stage; None if unknown.
+        note: next step, or best value so far, in words.
     """
 
     stage: str
@@ -26,26 +26,26 @@ Callback = Callable[[Progress], None]
 
 
 class Stages:
-    """Tells a callback of the stages of a study.
+    """Report the stages of a study to a callback.
 
     Args:
-        callback: called at the start of every stage and within it; None for silence.
+        callback: called at the start of every stage and within it; None for no messages.
     """
 
     def __init__(self, callback: Callback | None = None) -> None:
         self._callback, self._stage = callback, ""
 
     def begin(self, stage: str) -> None:
-        """Names the next stage."""
+        """Start the next stage."""
         self._stage = stage
         self._tell(Progress(stage))
 
     def step(self, step: int, total: int, best: float | None) -> None:
-        """The callback of a search."""
+        """Report a step of a search, with the best value so far."""
         self.count(step, total, f"best {best:.4g}")
 
     def count(self, done: int, total: int | None, note: str = "") -> None:
-        """How much of the stage is done, and what is next."""
+        """Report the steps done, the total (None if unknown) and a note on the next step."""
         self._tell(Progress(self._stage, done, total, note))
 
     def _tell(self, progress: Progress) -> None:

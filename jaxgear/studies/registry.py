@@ -1,6 +1,6 @@
-"""The studies by name, those of this package and those that other packages provide; imports one when it is asked for.
+"""Studies by name, of this package and of other packages; a study is imported on first use.
 
-Another package names its own as entry points of the group `jaxgear.studies`:
+Another package provides studies as entry points of the group `jaxgear.studies`:
 
     [project.entry-points."jaxgear.studies"]
     heat = "my_package.heat:HeatStudy"
@@ -13,7 +13,7 @@ from typing import Any
 
 from ..provided import provided as provided_by
 
-# the studies of this package by the names of their commands, likewise
+# studies of this package as `module:class`, by the names of their commands
 OWN = {
     name: f"{__package__}.{place}"
     for name, place in {
@@ -29,18 +29,18 @@ OWN = {
 
 
 def provided() -> dict[str, str]:
-    """Place of every study that installed packages provide, likewise."""
+    """Studies provided by other installed packages as `module:class`, by the names of their commands."""
     return {name: entry.value for name, entry in provided_by("studies").items()}
 
 
 def help_of(place: str) -> str:
-    """The docstring of a study up to its first section, read without importing it; "" where there is no source."""
+    """Docstring of a study up to its first section, read without importing its module; "" without source code."""
     module, _, cls = place.partition(":")
     try:
         spec = importlib.util.find_spec(module)
         loader: Any = None if spec is None else spec.loader
         tree = ast.parse(loader.get_source(module))
-    except (ImportError, AttributeError, SyntaxError, TypeError, ValueError):  # not there, or no source
+    except (ImportError, AttributeError, SyntaxError, TypeError, ValueError):  # no such module, or no source
         return ""
     classes = {one.name: one for one in tree.body if isinstance(one, ast.ClassDef)}
     docstring = ast.get_docstring(classes[cls]) if cls in classes else None
@@ -50,10 +50,10 @@ def help_of(place: str) -> str:
 
 
 def load(place: str) -> Any:
-    """The class of a study.
+    """Import the class of a study.
 
     Args:
-        place: as `module:class`.
+        place: class as `module:class`.
 
     Raises:
         ValueError: when it cannot be imported, or is not an `AbstractStudy`.

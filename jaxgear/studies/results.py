@@ -13,7 +13,7 @@ from .summary_data import identity, versions
 
 
 def study_summary(study: AbstractStudy[Any], result: AbstractStudyResult) -> dict[str, Any]:
-    """Contents of `summary.json`: the result between its design file and its gears, and what it leaves out."""
+    """Contents of `summary.json`: design file, result, gears, and the ignored tables of the file."""
     design, left_out = study.design, "; ".join(line for line in (study.left_out, study.omits()) if line)
     return {
         **identity(design),
@@ -27,7 +27,7 @@ def study_summary(study: AbstractStudy[Any], result: AbstractStudyResult) -> dic
 
 
 def write_study_summary(folder: Path, study: AbstractStudy[Any], result: AbstractStudyResult) -> dict[str, Any]:
-    """Writes `summary.json` as the last file of a result, whose files it lists, and returns its contents."""
+    """Write `summary.json`, the last file of a result, with a list of all files; returns its contents."""
     name = "summary.json"
     contents = sorted({name, *(path.name for path in folder.iterdir())})
     data = {**study_summary(study, result), CONTENTS: contents}
@@ -38,13 +38,13 @@ def write_study_summary(folder: Path, study: AbstractStudy[Any], result: Abstrac
 def write_results(
     folder: str | Path, study: AbstractStudy[Any], result: AbstractStudyResult, *, figures: bool = True
 ) -> tuple[dict[str, Any], list[Path]]:
-    """Writes the files of a result, its figures and `summary.json`.
+    """Write the files of a result, its figures and `summary.json`.
 
     Args:
-        folder: for the files; made where it is missing.
+        folder: folder of the files; made if missing.
         study: the study.
-        result: what it has found.
-        figures: whether figures are drawn, which opens no window where the backend of matplotlib has none.
+        result: result of the study.
+        figures: True to draw figures; no window opens with a non-interactive backend of matplotlib.
 
     Returns:
         the contents of `summary.json` and the files of the figures.
@@ -60,7 +60,7 @@ def write_results(
 
 
 def save_figures(folder: Path, figures: Iterable[Figure], *, bold: str | None = None) -> dict[Path, str]:
-    """Writes figures, each under its name, the lines of one design bold; returns the captions by file."""
+    """Write figures to files under their names, the lines of one design bold; returns the captions by file."""
     from .. import plot
 
     saved = {}

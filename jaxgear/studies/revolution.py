@@ -1,4 +1,4 @@
-"""The study of a revolution: from a design file to the transmission error and the orders of teeth that differ."""
+"""Revolution study: transmission error and orders over whole revolutions, with deviations of single teeth."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -31,12 +31,12 @@ _PANEL = 62.0  # height [mm]
 class RevolutionStudy(AbstractStudy["RevolutionResult"]):
     """Run the pair over whole revolutions, every tooth with the deviations of the table `teeth`.
 
-    Compares the unmodified pair, the rule-based tip relief of ISO 6336-1, and the modification of the design file or
-    the optimum of its variables.
+    The command compares the unmodified pair, the rule-based tip relief of ISO 6336-1, and the modification of the
+    design file or the optimum of its variables.
 
     Attributes:
         teeth: deviations of the teeth.
-        search: for the optimum of the file; None where its modifications are numbers.
+        search: search for the optimum of the file; None if its modifications are numbers.
     """
 
     name: ClassVar = "revolution"
@@ -50,12 +50,12 @@ class RevolutionStudy(AbstractStudy["RevolutionResult"]):
         return cls(design, quick, teeth_of(design), search_of(design, quick=quick))
 
     def omits(self) -> str:
-        """The limits of [tolerance]: the teeth have deviations of their own."""
+        """Message that [tolerance] is ignored, as the teeth have the deviations of [teeth]; "" without [tolerance]."""
         stands = "tolerance" in self.design.tables
         return "[tolerance] is not part of this analysis, the teeth have the deviations of [teeth]" * stands
 
     def work_out(self, checkpoints: Checkpoints, stages: Stages) -> "RevolutionResult":
-        """The revolutions of all designs at the torque of the file."""
+        """Compute the revolutions of all designs at the torque of the file."""
         design, found = self.design, {}
         mesh, designs = compared(design, design.torque, self.search, checkpoints, stages, quick=self.quick)
         mesh = changed(mesh, automatic=design.takes_more_pairs)
@@ -95,8 +95,8 @@ class RevolutionResult(AbstractStudyResult):
     Attributes:
         design: the design file.
         teeth: deviations of the teeth.
-        designs: their modifications (pinion, wheel) by name.
-        revolutions: by name.
+        designs: modifications (pinion, wheel) by the name of the design.
+        revolutions: revolutions by the name of the design.
     """
 
     assumptions: ClassVar = (
@@ -116,7 +116,7 @@ class RevolutionResult(AbstractStudyResult):
         yield table_of(_RECORDS, self.revolutions, title, "design")
 
     def verdict(self) -> Iterator[str]:
-        """The most loaded teeth of every design."""
+        """Lines on the most loaded teeth of every design."""
         for name, revolution in self.revolutions.items():
             said = []
             for gear, of in zip(GEARS, self.teeth.deviations):
@@ -127,7 +127,7 @@ class RevolutionResult(AbstractStudyResult):
                 yield f"{name}: most loaded, of the mean tooth's load: {', '.join(said)}"
 
     def failures(self) -> Iterator[str]:
-        """A line for every design whose contact was not found somewhere."""
+        """Line for every design whose contact has not converged at some position."""
         for name, revolution in self.revolutions.items():
             lost = ~np.asarray(revolution.converged)
             if lost.any():
@@ -142,7 +142,7 @@ class RevolutionResult(AbstractStudyResult):
         return {UnitKey("torque", "N m"): self.design.torque}
 
     def summary(self) -> dict[str, Any]:
-        """Numbers and shares of the teeth of all designs."""
+        """Numbers of all designs, and load shares of their teeth, as plain data."""
         designs = {
             name: {
                 **numbers_of(_RECORDS, revolution),
@@ -154,7 +154,7 @@ class RevolutionResult(AbstractStudyResult):
         return {"base_pitches": next(iter(self.revolutions.values())).windows, "designs": designs}
 
     def write(self, folder: Path) -> None:
-        """Transmission error at every place, `revolution.csv`, and the named orders, `orders.csv`, of all designs."""
+        """Write the transmission error of all designs to `revolution.csv`, and the named orders to `orders.csv`."""
         first = next(iter(self.revolutions.values()))
         curves = (np.asarray(found.transmission_error) for found in self.revolutions.values())
         header = "phase", *(f"{name}_um" for name in self.revolutions)

@@ -31,7 +31,7 @@ _TITLE = 9.0  # [pt]
 
 
 def table(file: DesignFile, evaluations: Evaluations) -> Table:
-    """The designs side by side at the design torque."""
+    """Table of the designs side by side at the design torque."""
     result = Table(("", *evaluations), title=f"{file.title}, {file.load_in_words} on the pinion")
     first = next(iter(evaluations.values()))
     second = verified(evaluations)
@@ -41,7 +41,7 @@ def table(file: DesignFile, evaluations: Evaluations) -> Table:
         result.add_row(label, *(format(evaluation.objectives[label], ".4g") for evaluation in evaluations.values()))
         if second:
             result.add_row(_BY_FINITE_ELEMENTS, *(format(each.objectives[label], ".4g") for each in second))
-    for quantity in dict.fromkeys([*asked, *rows]):  # what was asked for stands first
+    for quantity in dict.fromkeys([*asked, *rows]):  # requested quantities come first
         cells = (evaluation.metrics[quantity.key] for evaluation in evaluations.values())
         result.add_row(quantity.heading, *(format(cell, quantity.form) for cell in cells))
         if second and (quantity.name == "ppte" or quantity in asked):
@@ -58,7 +58,7 @@ def table(file: DesignFile, evaluations: Evaluations) -> Table:
 
 
 def failures(evaluations: Evaluations) -> Iterator[str]:
-    """A line for every design whose contact solution failed somewhere."""
+    """Line for every design whose contact has not converged at some torque."""
     for name, evaluation in evaluations.items():
         if evaluation.failed_torques:
             torques = ", ".join(f"{torque:g}" for torque in evaluation.failed_torques)
@@ -69,7 +69,7 @@ def failures(evaluations: Evaluations) -> Iterator[str]:
 
 
 def findings(file: DesignFile, mesh: Mesh, evaluations: Evaluations) -> dict[str, tuple[Finding, ...]]:
-    """Findings of every design, by its name."""
+    """Findings by the name of the design."""
     options: dict[str, Any] = {"torque_range": file.torque_range, "speed": file.speed, "friction": file.friction}
     options |= {"compliance": mesh.compliance, "lubricant": file.tables.get("lubricant")}
     found = {}
@@ -88,18 +88,18 @@ def findings(file: DesignFile, mesh: Mesh, evaluations: Evaluations) -> dict[str
 
 @program
 def _support_deflection(mesh: Mesh, line_load) -> Float[Array, ""]:
-    """Mean transmission error by deflection of the support [um]."""
+    """Mean transmission error due to the deflection of the support [um]."""
     return jnp.mean(mesh.support_deflection(line_load))
 
 
 def finding_lines(found: Mapping[str, tuple[Finding, ...]]) -> Iterator[str]:
-    """A line for everything that is not usual, with the designs that have it and their numbers where they differ."""
+    """Line for every finding, with the designs that have it and their values if these differ."""
     grouped: dict[tuple[str, str], dict[str, Finding]] = {}
     for design, several in found.items():
         for finding in several:
             grouped.setdefault((finding.key, finding.where), {})[design] = finding
     for same in grouped.values():
-        finding = list(same.values())[-1]  # the last is the one that the run is about
+        finding = list(same.values())[-1]  # the main design is the last
         numbers = {design: each.number for design, each in same.items()}
         if len(set(numbers.values())) > 1:
             said = f"{', '.join(f'{design} {number}' for design, number in numbers.items())}: "
@@ -109,20 +109,20 @@ def finding_lines(found: Mapping[str, tuple[Finding, ...]]) -> Iterator[str]:
 
 
 def grid(evaluations: Evaluations, more: str = "") -> Iterator[str]:
-    """How fine the mesh was, and what a finer one would change, besides `more`."""
+    """Lines on the grid of the mesh and on the changes on a finer grid, with the text `more`."""
     moving = next(iter(evaluations.values())).cycle.kinematics
     changes = {name: evaluation.grid_change for name, evaluation in evaluations.items()}
     return grid_lines(grid_of(moving.resolution, helical=moving.helical), changes, more)
 
 
 def quantities_of(evaluations: Evaluations) -> list[Quantity]:
-    """The quantities that are known of every design, in the order of the vocabulary."""
+    """Quantities evaluated for all designs, in the order of the vocabulary."""
     known = [evaluation.metrics for evaluation in evaluations.values()]
     return [quantity for quantity in quantities.values() if all(quantity.key in metrics for metrics in known)]
 
 
 def objectives(evaluations: Evaluations) -> list[str]:
-    """Labels of the objectives of an optimization that are no quantity in the rows of the table."""
+    """Labels of objectives of an optimization that are not rows of the table already."""
     known = {quantity.named for quantity in quantities_of(evaluations)}
     return [label for label in next(iter(evaluations.values())).objectives if label not in known]
 
@@ -133,7 +133,7 @@ def verified(evaluations: Evaluations) -> list[Verified]:
 
 
 def main(evaluations: Evaluations) -> Evaluation:
-    """The design that the run is about: the optimum where there is one, else the last."""
+    """Evaluation of the main design: the optimum if it exists, else the last."""
     return evaluations[main_name(evaluations)]
 
 
@@ -192,7 +192,7 @@ def _maps(mesh: Mesh, design: Evaluation, name: str) -> Iterator[Figure]:
 
 
 def _orders(mesh: Mesh) -> int:
-    """As many as the positions resolve."""
+    """Number of orders that the positions resolve, at most `_ORDERS`."""
     return max(1, min(_ORDERS, (mesh.resolution.positions - 1) // 2))
 
 

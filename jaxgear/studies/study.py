@@ -18,10 +18,10 @@ R = TypeVar("R", bound="AbstractStudyResult", covariant=True)
 class AbstractStudyResult(abc.ABC):
     """Result of a study.
 
-    All methods but `summary` have a default: a result of numbers alone needs nothing else.
+    All methods except `summary` have a default.
 
     Attributes:
-        assumptions: assumptions of the study, beside those of every contact analysis, for a report.
+        assumptions: assumptions of the study for a report, in addition to those of every contact analysis.
     """
 
     assumptions: ClassVar[tuple[str, ...]] = ()
@@ -35,31 +35,31 @@ class AbstractStudyResult(abc.ABC):
         """The results as plain data; a `UnitKey` is a name with a unit."""
 
     def headlines(self) -> Iterable[Table]:
-        """Tables of two columns to be read before all others; they say what `findings` says."""
+        """Tables of two columns, shown before all others; they include the lines of `findings`."""
         return ()
 
     def tables(self) -> Iterable[Table]:
-        """Tables to be read first."""
+        """Tables of the results."""
         return ()
 
     def verdict(self) -> Iterable[str]:
-        """The result in words, a line each."""
+        """Lines that describe the result."""
         return ()
 
     def details(self) -> Iterable[str]:
-        """How it was found, in words, said last."""
+        """Lines on the calculation of the result, shown last."""
         return ()
 
     def findings(self) -> Iterable[str] | None:
-        """A line for everything out of the usual range; None where that is not checked."""
+        """Line for every value outside the usual range; None if usual ranges are not checked."""
         return None
 
     def failures(self) -> Iterable[str]:
-        """A line for every result that did not converge or limit that is not met; a command fails with any."""
+        """Line for every result that has not converged and every limit that is not met; any line fails the command."""
         return ()
 
     def checks(self) -> Iterable[tuple[str, str]]:
-        """Name and text of numbers that show convergence and validity, for a report."""
+        """Names and texts of the checks of convergence and validity, for a report."""
         return ()
 
     def chapters(self) -> Iterable[Chapter]:
@@ -67,11 +67,11 @@ class AbstractStudyResult(abc.ABC):
         return ()
 
     def figures(self) -> Iterable[Figure]:
-        """The figures, drawn anew."""
+        """Figures of the result, drawn at every call."""
         return ()
 
     def reported(self, folder: Path, facts: Sequence[tuple[str, str]], *, figures: bool) -> "AbstractStudyResult":
-        """The result with everything that a report shows besides; by default the result itself.
+        """Result with the additional content of a report; by default the result itself.
 
         Args:
             folder: folder of the results, for further files.
@@ -81,29 +81,29 @@ class AbstractStudyResult(abc.ABC):
         return self
 
     def write(self, folder: Path) -> None:  # noqa: B027 - the default writes nothing
-        """Writes further files, such as tables of every number, into a folder."""
+        """Write further files, such as tables of all values, into a folder."""
 
 
 @dataclass(frozen=True)
 class AbstractStudy(abc.ABC, Generic[R]):
     """A study of a design file.
 
-    A library calls `Study.of(design).run()`; the command line makes a command of every study that it knows, with
-    progress, report, interruption and resumption. The docstring of a study, up to its first section, is the help of
-    that command. A study of another package is a command where the package names it as an entry point of the group
-    `jaxgear.studies`. Numbers are those of double precision where `jax_enable_x64` is set, as commands set it.
+    Call `Study.of(design).run()` in Python. The command line makes a command of every study, with progress, report,
+    interruption and resumption; the docstring of the study, up to its first section, is the help of the command. A
+    study of another package becomes a command by an entry point of the group `jaxgear.studies`. Commands compute in
+    double precision; in Python the precision follows `jax_enable_x64`.
 
     Attributes:
-        name: of the study and of its command.
-        coarse: what a quick study has too few of; "" where its result says it.
-        needs: modules that it imports late; a command imports them ahead, beside its first compilation.
-        report_needs: modules that its report needs besides.
-        grows: elements of a result that grows in its folder, a field `output` of the study, while the study runs for
-            long, such as "variants"; "" if all results are put in place at the end.
-        takes_shafts: whether the shafts of the file support the gears at every load.
-        takes_coast: whether it knows the coast flanks, which carry a negative torque.
-        design: the design file.
-        quick: whether the study is a preview on few positions.
+        name: name of the study and of its command.
+        coarse: array sizes that are coarse in a quick study, in words; "" if the result reports them.
+        needs: modules that the study imports late; a command imports them in advance, during its first compilation.
+        report_needs: further modules that its report imports.
+        grows: name of the elements, such as "variants", of a result that grows in the folder `output` of the study
+            while it runs; "" if all results are written at the end.
+        takes_shafts: True if the shafts of the file support the gears at every load.
+        takes_coast: True if the study analyses coast flanks, which carry a negative torque.
+        design: design file.
+        quick: True for a preview on few positions.
     """
 
     name: ClassVar[str]
@@ -119,27 +119,28 @@ class AbstractStudy(abc.ABC, Generic[R]):
 
     @classmethod
     def of(cls, design: DesignFile, *, quick: bool = False) -> Self:
-        """The study that a design file asks for, checked before anything is worked out.
+        """Make the study of a design file, checked before any calculation.
 
         Args:
-            design: the design file.
-            quick: a preview on few positions.
+            design: design file.
+            quick: True for a preview on few positions.
 
         Raises:
-            DesignFileError: for anything that is wrong with it, in one line that names the file and the key.
+            DesignFileError: for errors in the file, in one line that names the file and the key.
         """
         return cls(design, quick)
 
     def run(self, *, checkpoints: Checkpoints | None = None, callback: Callback | None = None) -> R:
-        """Works the study out.
+        """Run the study.
 
         Args:
-            checkpoints: what an interrupted run has found, and where this one keeps what it finds; None keeps nothing.
-            callback: told how far the study is; an exception that it raises ends the study.
+            checkpoints: intermediate results of an interrupted run, and storage for those of this run; None to store
+                nothing.
+            callback: called with the progress of the study; an exception that it raises ends the study.
 
         Raises:
-            DesignFileError: for what only shows in the calculation.
-            ValueError: when a checkpoint cannot be written.
+            DesignFileError: for errors in the file that only the calculation reveals.
+            ValueError: if a checkpoint cannot be written.
         """
         if not self.takes_coast:
             self.design.check_drive(f"jaxgear {self.name}")
@@ -151,16 +152,16 @@ class AbstractStudy(abc.ABC, Generic[R]):
 
         Args:
             checkpoints: checkpoints of long calculations.
-            stages: progress, told of every stage.
+            stages: progress of the study.
         """
 
     @property
     def folder(self) -> str:
-        """Folder of its results below that of the design file."""
+        """Folder of the results of the study, relative to the results folder of the design file."""
         return self.name
 
     def omits(self) -> str:
-        """Message naming the tables of the file, but for its shafts, that the study ignores and why; "" for none."""
+        """Message naming the tables of the file, shafts excepted, that the study ignores, and why; "" for none."""
         return manufactured.left_out(self.design)
 
     @property

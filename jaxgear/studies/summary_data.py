@@ -40,18 +40,18 @@ def versions() -> dict[str, str]:
 
 
 def sizes(of: Resolution) -> dict[str, Any]:
-    """Array sizes by name, with the slide steps that are chosen where none are given."""
+    """Array sizes by name; `slide_steps` is the number in use, also if it was chosen automatically."""
     given = {field.name: getattr(of, field.name) for field in dataclasses.fields(of)}
     return given | {"slide_steps": of.chosen_slide_steps}
 
 
 def model(mesh: Mesh) -> dict[str, Any]:
-    """The compliance by the names of its parts, with their options, and its plane state."""
+    """Parts of the compliance by name, with their options, and its plane state, as plain data."""
     return {"compliance": _options(mesh.compliance), "plane": mesh.compliance.plane}
 
 
 def _options(part: eqx.Module) -> dict[str, Any]:
-    """The type of a part and its options, in the words of a design file; of tables their sizes."""
+    """Type and options of a part, in the words of a design file; for tables their sizes."""
     data: dict[str, Any] = {"type": snake(type(part).__name__)}
     for field in dataclasses.fields(part):
         value = getattr(part, field.name)
@@ -65,7 +65,7 @@ def _options(part: eqx.Module) -> dict[str, Any]:
 
 
 def finding_data(finding: Finding) -> dict[str, Any]:
-    """A finding by name, place, value and what is usual."""
+    """Name, place, value and usual range of a finding, as plain data."""
     return {"name": finding.key, "where": finding.where, "value": finding.value, **finding.usual._asdict()}
 
 

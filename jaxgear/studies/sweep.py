@@ -1,4 +1,4 @@
-"""The sweep study: from a design file to a table of any number of variants."""
+"""Sweep study: table of any number of variants of a design file."""
 
 import os
 import time
@@ -28,10 +28,10 @@ _LINES, _QUIET = 10, 30.0  # lines of progress of a sweep, and seconds after whi
 
 @dataclass(frozen=True)
 class SweepStudy(AbstractStudy[SweepResult]):
-    """Evaluate the variants that the design file asks for, any number of them, into a table of Parquet files.
+    """Evaluate the variants of the design file, any number of them, into a table of Parquet files.
 
-    The folder "table" of the results holds it and nothing else: pandas, polars and Arrow read it as a whole. An
-    interrupted sweep goes on where it was when the command is repeated.
+    The folder "table" of the results contains only the table: pandas, polars and Arrow read the folder as a whole. An
+    interrupted sweep resumes when the command is repeated.
 
     Attributes:
         settings: table [sweep] of the design file.
@@ -56,8 +56,8 @@ class SweepStudy(AbstractStudy[SweepResult]):
         Args:
             design: the design file.
             quick: True for coarse positions and few samples.
-            samples: number of variants in place of that of the file.
-            best: number of the best designs that are listed.
+            samples: number of variants; None for the number of the file.
+            best: number of best designs to list.
         """
         with naming(design.path):
             section = design.needed("sweep", "it says which variants to evaluate")
@@ -66,11 +66,11 @@ class SweepStudy(AbstractStudy[SweepResult]):
         return cls(design, quick, settings, best)
 
     def omits(self) -> str:
-        """Nothing: variants scatter within [tolerance]."""
+        """Empty message: variants scatter within [tolerance]."""
         return ""
 
     def work_out(self, checkpoints: Checkpoints, stages: Stages) -> SweepResult:
-        """The table of all variants and the best of them; the table keeps what an interrupted sweep has evaluated."""
+        """Evaluate all variants and find the best; the table itself stores the variants of an interrupted sweep."""
         design, options = self.design, self.settings.arguments(self.design)
         size = design.resolution(options.pop("highest_torque"))
         size = coarse(size) if self.quick else size
@@ -80,7 +80,7 @@ class SweepStudy(AbstractStudy[SweepResult]):
         meter, output = _Meter(stages), None if self.output is None else self.output / TABLE
         load, plan = options.pop("load"), options.pop("plan")
         table = sweep(design.sweep_mesh(size), load, design.design, plan, output=output, callback=meter, **options)
-        if jax.process_index() > 0:  # the first process speaks for all
+        if jax.process_index() > 0:  # only the first process reports
             return SweepResult(design, self.quick, self.output, size, table, table.take([]), (), (), meter.rate)
         chosen = table.best(self.best)
         grid, findings = said_of_best(design, chosen, size) if len(chosen) else ([], [])
@@ -88,7 +88,7 @@ class SweepStudy(AbstractStudy[SweepResult]):
 
 
 def _check(target: Path) -> None:
-    """Raises a `ValueError` for a folder of something else: a file of its own could have the name of a result."""
+    """Raise a `ValueError` for a folder with other contents, which results could overwrite."""
     with writing(target):
         others = [] if (target / TABLE).exists() or not target.is_dir() else sorted(os.listdir(target))
     if others:
@@ -96,7 +96,7 @@ def _check(target: Path) -> None:
 
 
 class _Meter:
-    """Callback of a sweep: a stage for every tenth of the variants, and after some time in any case."""
+    """Callback of a sweep: reports every tenth of the variants, and at least after `_QUIET` seconds."""
 
     def __init__(self, stages: Stages) -> None:
         self._stages, self._done, self._first = stages, -1, 0
@@ -119,13 +119,19 @@ class _Meter:
 
     @property
     def rate(self) -> float:
-        """Variants per second of this process, with the compilation of its program."""
+        """Variants per second of this process, compilation included."""
         spent = time.perf_counter() - self._since
         return max(self._done - self._first, 0) / spent if spent > 0 else 0.0
 
 
 def said_of_best(design: DesignFile, best: SweepTable, size: Resolution) -> tuple[list[str], list[str]]:
-    """Lines on the change of the numbers of the best variant on a finer grid, and lines of its findings."""
+    """Lines on the best variant: changes of its values on a finer grid, and its findings.
+
+    Args:
+        design: design file.
+        best: table whose first row is the best variant.
+        size: array sizes of the mesh.
+    """
     parameters = best.take([0]).designs()[0]
     made = design.sweep_mesh(size)
     mesh = made if isinstance(made, Mesh) else made(parameters)

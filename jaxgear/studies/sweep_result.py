@@ -23,12 +23,12 @@ from .results import save_figures
 from .study import AbstractStudyResult
 from .summary_data import sizes
 
-TABLE, BEST = "table", "best.csv"  # apart: readers of the table take its folder for theirs alone
+TABLE, BEST = "table", "best.csv"  # separate, as readers of the table expect a folder without other files
 WORKBOOK, PAGE = "variants.xlsx", "variants.html"
 CHOSEN = 3  # variants that a report evaluates
 _SHOWN = 8  # of the best designs, on a terminal
 _TABLE = 6  # side by side on one page of a report
-_DRAWN = 200_000  # variants; of more, every so many-th is drawn, so that memory does not grow with the table
+_DRAWN = 200_000  # most variants drawn; of larger tables every n-th variant is drawn, which bounds the memory
 _CHARTS = 6  # radar charts
 _UNMODIFIED = "unmodified"
 
@@ -60,7 +60,7 @@ class SweepResult(AbstractStudyResult):
     rate: float
 
     def tables(self) -> Iterator[Table]:
-        """The best variants as columns."""
+        """Table of the best variants, one column each."""
         shown = self.best.take(range(min(_SHOWN, len(self.best))))
         header = "variant", *map(str, shown.column("variant"))
         result = Table(header, title=f"{self.table.title}, best first by {self.table.results[0]}", narrow=True)
@@ -77,7 +77,7 @@ class SweepResult(AbstractStudyResult):
         return self.unusual
 
     def failures(self) -> Iterator[str]:
-        """How many variants have failed, and why."""
+        """Line with the number of failed variants and the reasons."""
         if failures := self.table.failures():
             why = self.table.why(self.size.chosen_pairs)
             yield f"{failures:,} variants failed (columns converged and status); {why}"
@@ -101,23 +101,23 @@ class SweepResult(AbstractStudyResult):
         }
 
     def summary(self) -> dict[str, Any]:
-        """How many variants there are."""
+        """Numbers of variants and of failed variants."""
         return {"variants": len(self.table), "failed_variants": self.table.failures()}
 
     def write(self, folder: Path) -> None:
-        """The best variants as `best.csv`."""
+        """Write the best variants to `best.csv`."""
         with writing(folder / BEST):
             self.best.to_csv(folder / BEST)
 
     def figures(self) -> Iterator[Figure]:
-        """All figures that the results allow, of a table with a variant that did not fail."""
+        """All figures that the quantities of the table allow; none if all variants have failed."""
         if len(self.best):
             yield from figures_of(self.table)
 
     def reported(self, folder: Path, facts: Sequence[tuple[str, str]], *, figures: bool) -> "SweepReport":
-        """The best variants evaluated at the torques of the design file; writes the workbook and the interactive page.
+        """Evaluate the best variants at the torques of the design file; writes the workbook and the interactive page.
 
-        Variants of more than the flanks, of other gears or loads, have no common mesh and stay as the table has them.
+        Variants of gears or loads have no common mesh; the report shows their values in the table instead.
         """
         write_workbook(folder / WORKBOOK, facts, self.best, self.table)
         if self.table.failures() < len(self.table):
@@ -159,7 +159,7 @@ class SweepReport(SweepResult):
             yield side_by_side.table(self.design, {name: self.evaluations[name] for name in names})
 
     def verdict(self) -> Iterator[str]:
-        """How variants are ranked and where they are, and why none is evaluated."""
+        """Lines on the ranking and the files of the variants, and on the reason if none is evaluated."""
         yield (
             f"{len(self.table)} variants, ranked by {self.table.results[0]}; the best {len(self.best)} and the table "
             f"are in {WORKBOOK}, with units and filters; {PAGE} is an interactive page of them."
@@ -180,11 +180,11 @@ class SweepReport(SweepResult):
         yield from super().failures()
 
     def details(self) -> Iterable[str]:
-        """Nothing."""
+        """No lines: `verdict` contains them."""
         return ()
 
     def chapters(self) -> Iterator[Chapter]:
-        """The best variants side by side, and a page of each of the first of them."""
+        """Chapters on the best variants side by side, and one page for each of the first ones."""
         if len(self.best):
             shown = self.best.take(range(min(_TABLE, len(self.best))))
             _, *columns = shown.columns
@@ -193,7 +193,7 @@ class SweepReport(SweepResult):
         yield from map(self._page, range(min(CHOSEN, len(self.best))))
 
     def figures(self) -> Iterator[Figure]:
-        """Figures of the evaluated variants, and of the sweep; a variant has one style in all."""
+        """Figures of the evaluated variants and of the sweep; a variant has the same style in all figures."""
         from .. import plot
 
         if self.mesh is not None:
@@ -202,7 +202,8 @@ class SweepReport(SweepResult):
         yield from super().figures()
 
     def alone(self, folder: Path) -> dict[str, dict[Path, str]]:
-        """Writes the figures of each variant beside the unmodified pair alone; returns their captions by file."""
+        """Write figures of each variant compared with the unmodified pair only; returns captions by variant and file.
+        """
         from .. import plot
 
         first, *others = self.evaluations
@@ -222,7 +223,7 @@ class SweepReport(SweepResult):
             yield dataclasses.replace(figure, name=f"{figure.name}_{names[-1].replace(' ', '_')}")
 
     def _page(self, place: int) -> Chapter:
-        """One variant, and what it is among the others."""
+        """Chapter on one variant and its rank among the others."""
         name, best = _names(self.best)[place], self.best
         rows = []
         for column in map(best.find, (*best.parameters, *best.results)):
@@ -234,7 +235,7 @@ class SweepReport(SweepResult):
 
 
 def figures_of(table: SweepTable) -> Iterator[Figure]:
-    """All figures that the results allow, of a table with a variant that did not fail."""
+    """All figures that the quantities of a table allow; at least one variant must have converged."""
     from .. import plot
 
     heads, size = table.heads, len(table)
@@ -251,7 +252,7 @@ def figures_of(table: SweepTable) -> Iterator[Figure]:
     with plot.same_styles(_styles(best)):
         if len(heads) > 1:
             shown = rows
-            if step > 1:  # the front is that of all variants, whichever of the others are drawn
+            if step > 1:  # the front is computed from all variants, drawn or not
                 shown = np.union1d(rows, table.pareto([head.name for head in heads[:3]]).column("variant"))
             yield noted(Figure.of(plot.pareto, table.take(shown).values(*heads[:3])))
         numbers = np.union1d(rows, best.column("variant"))  # the best of all, too

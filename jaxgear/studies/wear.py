@@ -1,4 +1,4 @@
-"""The wear study: from a design file to its flanks over their life."""
+"""Wear study: worn flanks of a design file over the revolutions."""
 
 import dataclasses
 from collections.abc import Mapping
@@ -19,21 +19,22 @@ from .study import AbstractStudy
 from .wear_result import OVER_LIFE, WearResult
 
 _QUICK_BLOCKS = 4
-_MOST_BLOCKS = 1000  # of a life of manufactured gears
+_MOST_BLOCKS = 1000  # most blocks of a wear history of manufactured gears
 
 
 @dataclass(frozen=True)
 class WearStudy(AbstractStudy[WearResult]):
     """Wear the flanks of the pair over the revolutions of the table `wear`.
 
-    Compares the unmodified pair, the rule-based tip relief of ISO 6336-1, and the modification of the design file or
-    the optimum of its variables. What an interrupted command has found is kept: the same command goes on from there.
+    The command compares the unmodified pair, the rule-based tip relief of ISO 6336-1, and the modification of the
+    design file or the optimum of its variables. An interrupted command resumes from its stored results when it is
+    repeated.
 
     Attributes:
         settings: revolutions and wear coefficients.
-        search: for the optimum of the file; None where its modifications are numbers.
-        over_life: for the lowest mean PPTE over the life, under the static load; None where nothing is sought for it.
-        tolerance: of manufactured gears; None where they are not worn.
+        search: search for the optimum of the file; None if its modifications are numbers.
+        over_life: search for the lowest mean PPTE over the wear history, under the static load; None for no search.
+        tolerance: manufactured gears that are worn; None for none.
     """
 
     name: ClassVar = "wear"
@@ -53,17 +54,17 @@ class WearStudy(AbstractStudy[WearResult]):
         if quick:
             settings = dataclasses.replace(settings, blocks=_QUICK_BLOCKS, largest_increment=None)
         search = search_of(design, quick=quick)
-        # a step of the search wears a life: under the static load, which takes far less than a motion in every block
+        # every step of the search computes a wear history: under the static load, far faster than with dynamics
         static = dataclasses.replace(settings, line_load=None, dynamics=None)
         over_life = None if search is None else search.over_life(static)
         return cls(design, quick, settings, search, over_life, gears)
 
     def omits(self) -> str:
-        """Manufactured gears under the dynamic line load."""
+        """Message on manufactured gears, which are ignored under the dynamic line load; "" for none."""
         return wear_scatter.left_out(self.design)
 
     def work_out(self, checkpoints: Checkpoints, stages: Stages) -> WearResult:
-        """The lives of all designs, and of manufactured pairs where the file has tolerances."""
+        """Compute the wear histories of all designs, and of manufactured pairs if the file has tolerances."""
         design, quick = self.design, self.quick
         highest = max(design.torque, design.torque_range[1])
         mesh, designs = compared(design, highest, self.search, checkpoints, stages, quick=quick)
@@ -87,7 +88,7 @@ class WearStudy(AbstractStudy[WearResult]):
     def _life(
         self, mesh: Mesh, name: str, flanks: Modifications, kept: CheckpointsOfKind[Any], stages: Stages
     ) -> WearHistory:
-        """The life of one design, at the torque of the file."""
+        """Wear history of one design at the torque of the file."""
         stages.begin(f"wear of the {name} design")
         design, (pinion, wheel) = self.design, flanks
 

@@ -46,9 +46,9 @@ _QUANTITIES = (
 )
 # of the depth: an uncertainty by the blocks that is not told
 _WORTH_A_WORD = 0.01
-OVER_LIFE = "optimum over life"  # the design that is sought for the least mean PPTE over the life
+OVER_LIFE = "optimum over life"  # name of the design with the lowest mean PPTE over the wear history
 _PANEL, _HEIGHT = 80.0, 84.0  # [mm]
-_BEYOND = "*"  # marks lives that are longer than what was looked at
+_BEYOND = "*"  # marks lives beyond the simulated revolutions
 _OF_MOTION = " Or the flanks vibrate without an orbit, or until coast flanks touch: run jaxgear dynamics."
 
 
@@ -58,8 +58,8 @@ class _Life(NamedTuple):
     Attributes:
         history: the wear history.
         ppte: PPTE at the time steps [um], shape (steps,).
-        volume: worn volume per flank in the end [mm3], shape (gears, parts).
-        factors: dynamic factor at the time steps, shape (steps,); empty where nothing vibrates.
+        volume: worn volume per flank at the end [mm3], shape (gears, parts).
+        factors: dynamic factor at the time steps, shape (steps,); empty without dynamics.
     """
 
     history: WearHistory
@@ -75,7 +75,7 @@ class WearResult(AbstractStudyResult):
     Attributes:
         design: the design file.
         settings: revolutions and wear coefficients.
-        designs: their modifications (pinion, wheel) by name.
+        designs: modifications (pinion, wheel) by the name of the design.
         lives: wear histories by name.
         scatters: numbers of the wear histories of manufactured pairs by name; empty where the file has no tolerances.
     """
@@ -136,7 +136,7 @@ class WearResult(AbstractStudyResult):
             yield Record("life_to_ppte", "revolutions", lambda of: life_to(of.history, "ppte", ppte), heading, shown)
 
     def tables(self) -> Iterator[Table]:
-        """The lives of all designs, and their scatter over manufactured pairs where the file has tolerances."""
+        """Tables of the wear histories of all designs, and of their scatter if the file has tolerances."""
         settings, lives = self.settings, self._lives()
         title = f"{self.design.title}: {float(settings.revolutions):.3g} revolutions at {self._loads()}"
         table = table_of(list(self._records()), lives, title, "design")
@@ -146,7 +146,7 @@ class WearResult(AbstractStudyResult):
         yield from wear_scatter.tables(self.design, settings, self.scatters)
 
     def _loads(self) -> str:
-        """Under what the flanks wear."""
+        """Loads that wear the flanks, in words."""
         settings, text = self.settings, self._torques()
         if settings.dynamics is None:
             return text
@@ -161,7 +161,7 @@ class WearResult(AbstractStudyResult):
         return text if loads is None else f"{text} ({self._shares()})"
 
     def _shares(self) -> str:
-        """Which shares of the revolutions the torques have."""
+        """Meaning of the weights of the torques, in words."""
         assert self.settings.loads is not None
         if self.design.tables["wear"].weights is None:
             return "each for the same share of the revolutions, the default without wear.weights"
@@ -169,7 +169,7 @@ class WearResult(AbstractStudyResult):
         return "for " + ", ".join(f"{100 * share:.3g}" for share in shares) + " % of the revolutions"
 
     def verdict(self) -> Iterator[str]:
-        """The best on the mean over the life, and how sure the depths are."""
+        """Lines on the design with the best mean over the wear history, and on the error of the depths."""
         means = {name: float(mean_over_life(history, "ppte")) for name, history in self.histories.items()}
         found = {name: mean for name, mean in means.items() if np.isfinite(mean)}
         if found:
@@ -195,7 +195,7 @@ class WearResult(AbstractStudyResult):
         return text + ", not under the dynamic one under which all designs wear here" * vibrates
 
     def failures(self) -> Iterator[str]:
-        """A line for every design whose contact was not found at some time step, or whose blocks were too long."""
+        """Line for every design whose contact has not converged at some time step, or whose blocks are too long."""
         for name, history in self.histories.items():
             found = np.asarray(history.cycles.converged)
             lost = ~found.reshape(len(found), -1).all(axis=1)
@@ -223,7 +223,7 @@ class WearResult(AbstractStudyResult):
         }
 
     def summary(self) -> dict[str, Any]:
-        """The lives of all designs."""
+        """Numbers of the wear histories of all designs, as plain data."""
         records = list(self._records())
         designs = {
             name: {
@@ -237,7 +237,7 @@ class WearResult(AbstractStudyResult):
         return {**({"optimum_over_life": self._sought()} if OVER_LIFE in self.designs else {}), "designs": designs}
 
     def write(self, folder: Path) -> None:
-        """Every time step and every flank of every design: `life.csv`, `worn_flanks.csv` and `worn_flanks.parquet`."""
+        """Write all time steps to `life.csv`, and all worn flanks to `worn_flanks.csv` and `worn_flanks.parquet`."""
         vibrates = self.settings.dynamics is not None
         known = [quantity_of(name) for name in (*_QUANTITIES, *(["dynamic_factor"] if vibrates else []))]
         depths = "pinion_wear_depth_um", "wheel_wear_depth_um", "wear_depth_error_um", "flank_pressure_error_MPa"
@@ -254,7 +254,7 @@ class WearResult(AbstractStudyResult):
             yield from ((name, *row) for row in zip(*(np.asarray(column, float) for column in columns)))
 
     def figures(self) -> Iterator[Figure]:
-        """Flanks at several time steps, PPTE and depth over the life, and the scatter over manufactured pairs."""
+        """Figures of flanks at several time steps, of PPTE and depth over the revolutions, and of the scatter."""
         from .. import plot
 
         for gear in ("pinion", "wheel"):

@@ -30,7 +30,7 @@ _SIDE_BY_SIDE = 32  # lives
 
 
 def left_out(design: DesignFile) -> str:
-    """Why the scatter is not told where the file has tolerances; "" where it is."""
+    """Reason why no scatter is computed although the file has tolerances; "" if it is computed."""
     if "wear" not in design.tables or design.tables["wear"].line_load != "dynamic":
         return ""
     return manufactured.left_out(
@@ -48,11 +48,11 @@ def manufactured_wear(
     *,
     keep: Callable[[Any, Callable[[], Samples]], Samples] | None = None,
 ) -> dict[str, Samples]:
-    """Wears manufactured pairs of several designs; all designs meet the same gears.
+    """Quantities of wear of manufactured pairs of several designs; all designs get the same samples.
 
     Args:
         mesh: prepared mesh.
-        torque: on the pinion [N m]; has no effect where the settings have torques of their own.
+        torque: torque on the pinion [N m]; ignored if the settings have loads.
         designs: modifications of pinion and wheel by name.
         settings: settings of the wear, under the static line load.
         manufactured: manufactured gears.
@@ -81,7 +81,7 @@ def manufactured_wear(
 
 @program
 def _numbers(settings: Wear, names: tuple[str, ...], mesh: Mesh, torque, pinion, wheel, removed):
-    """Quantities of the lives of all pairs; compiles for longer than it runs."""
+    """Quantities of the wear histories of all pairs; compilation takes longer than the computation."""
     load = torque if settings.loads is None else None
 
     def of(deviation):
@@ -92,7 +92,7 @@ def _numbers(settings: Wear, names: tuple[str, ...], mesh: Mesh, torque, pinion,
 
 
 def asked(settings: Wear) -> list[str]:
-    """Names of the quantities whose scatter is told."""
+    """Names of the quantities whose scatter is computed."""
     return [_PPTE, _DEPTH, *(name for name, (limit, _) in _LIVES.items() if getattr(settings, limit) is not None)]
 
 
@@ -116,7 +116,7 @@ def _records(settings: Wear) -> Iterator[Record[Samples]]:
 
 
 def lines(design: DesignFile, scatters: Mapping[str, Samples]) -> Iterator[str]:
-    """The best design of manufactured pairs in words; nothing without a table [tolerance]."""
+    """Lines on the best design over manufactured pairs; none without a table [tolerance]."""
     bounds = {name: _bound(samples, _PPTE) for name, samples in scatters.items()}
     found = {name: bound for name, bound in bounds.items() if np.isfinite(bound)}
     if found:
@@ -127,7 +127,7 @@ def lines(design: DesignFile, scatters: Mapping[str, Samples]) -> Iterator[str]:
 
 
 def failures(scatters: Mapping[str, Samples]) -> Iterator[str]:
-    """A line for every design of which manufactured pairs have failed."""
+    """Line for every design with manufactured pairs that have not converged."""
     for name, samples in scatters.items():
         if failed(samples):
             yield (
@@ -137,7 +137,7 @@ def failures(scatters: Mapping[str, Samples]) -> Iterator[str]:
 
 
 def summary(samples: Samples) -> dict[str, Any]:
-    """The scatter of a design as plain data; q95 is what 95 % of the pairs do not pass."""
+    """Scatter of a design as plain data; q95 is the value that 95 % of the pairs do not exceed."""
     found: dict[str, Any] = {"pairs": len(samples[_PPTE]), "failed": failed(samples)}
     for name in samples:
         values, key = samples[name], UnitKey(name, WEAR_QUANTITIES[name].unit)
@@ -172,9 +172,10 @@ def _bound(samples: Samples, name: str) -> float:
 
 
 def _lasts(samples: Samples, name: str, share: float) -> float:
-    """The longest life of a pair that at least a share of the pairs reach; NaN where failed ones are among the others.
+    """Longest life that at least a share of the pairs reach; NaN if it depends on failed pairs.
 
-    Not a mean of neighbouring lives, as other quantiles are: many lives are zero or end with the range computed.
+    The quantile is not interpolated between neighbouring lives: many lives are zero or end at the simulated
+    revolutions.
     """
     values = samples[name]
     lives = np.sort(np.where(np.isfinite(values), values, -np.inf))
@@ -183,7 +184,7 @@ def _lasts(samples: Samples, name: str, share: float) -> float:
 
 
 def _life_text(settings: Wear, name: str, value: float) -> str:
-    """Revolutions; a lower bound where the life is longer than what is looked at."""
+    """Revolutions in words; a lower bound for lives beyond the simulated revolutions."""
     most = _LIVES[name][1] * float(settings.revolutions)
     return f"> {most:.3g}" if value >= most else f"{value:.3g}"
 
