@@ -1,4 +1,4 @@
-"""Choosing a modification: gradient and evolutionary optimization, fronts, iterated and free-form flanks."""
+"""Optimization of modifications: gradient and evolutionary methods, Pareto fronts, iterated and free-form flanks."""
 
 from ..numerics import Callback as Callback
 from ..numerics import CVaR as CVaR

@@ -1,8 +1,7 @@
-"""Quantities of a design, differentiated only at the mesh positions that decide them.
+"""Quantities of a design, differentiated only at the mesh positions that determine them.
 
-A peak-to-peak value is that of two positions, the largest pressure that of one. What the contact does at a position
-depends on that position alone, so that the derivatives of such a quantity need the analysis of a few positions beside
-the value from all of them.
+A peak-to-peak value depends on two positions, a largest pressure on one. The contact at a position does not depend on
+other positions: the value of such a quantity needs all positions, its derivatives need a few.
 """
 
 from collections.abc import Callable
@@ -39,7 +38,7 @@ class _Given(NamedTuple):
     settings: tuple[AbstractSettings, ...]
 
     def analysis(self) -> Analysis:
-        """The analysis of the design."""
+        """Solve the contact and return its analysis."""
         cycle = solve(self.mesh, self.operating_point, pinion=self.pinion, wheel=self.wheel)
         return Analysis(cycle, self.mesh, self.settings)
 
@@ -74,27 +73,28 @@ def evaluate(
     pinion: AbstractModification | None = None,
     wheel: AbstractModification | None = None,
 ) -> Scalar | tuple[Scalar, ...]:
-    """Quantities of one design under one torque, whose derivatives cost little.
+    """Quantities of one design under one torque, with fast derivatives.
 
-    The numbers and their derivatives of any order, in either mode, are those of the quantities of `solve`. Where all
-    quantities are a largest or a smallest value of positions, or both as PPTE is, they are differentiated at the
-    positions that decide them alone: value and gradient of PPTE take half the time of those through `solve`.
+    Values and derivatives of any order, in either mode, equal those of the quantities of `solve`. If all quantities are
+    extremes over the positions, or a difference of two extremes such as PPTE, only the positions of the extremes are
+    differentiated: value and gradient of PPTE take half the time of `solve`.
 
         slope = jax.grad(lambda amount: evaluate(mesh, 50.0, "ppte", pinion=jg.TipRelief(amount, 4.0)))(7.0)
 
     Args:
         mesh: prepared mesh.
-        torque: on the pinion [N m], scalar; or an `OperatingPoint`.
+        torque: torque on the pinion [N m], shape (); or an `OperatingPoint`.
         quantities: name, `Quantity` or function of a mesh cycle; or a list of them.
         pinion: modification of the pinion flank; None for the nominal involute.
         wheel: modification of the wheel flank; None for the nominal involute.
 
     Returns:
-        the number, or a tuple with that of each; NaN where the contact is not solved at every position. While anything
-        is traced no pairs are added to the mesh, as in `solve`.
+        the value in the unit of the quantity, shape (), or a tuple of values; NaN if the contact has not converged at
+        every position. As in `solve`, no pairs are added to the mesh while tracing.
 
     Raises:
-        TypeError, ValueError: as `solve` does; for a quantity that is not known or lacks its settings, and for none.
+        TypeError, ValueError: errors of `solve`; for a quantity that is unknown or lacks its settings, and for an empty
+            list.
     """
     check_mesh(mesh)
     several = quantities if isinstance(quantities, list | tuple) else [quantities]
@@ -111,7 +111,7 @@ def evaluate(
 
 
 def _pieces(of: Quantity) -> tuple[int, float, float] | None:
-    """Sign and factors of the pieces that a quantity is made of; None where it needs every value."""
+    """Sign of a quantity and factors of its largest and smallest value; None if it needs all values."""
     both = ((sign, of.reduction.factors(sign)) for sign in (1, -1))
     return next(((sign, *factors) for sign, factors in both if factors is not None), None)
 

@@ -1,4 +1,4 @@
-"""Flanks of free form, every value of a table a parameter, and the named curve nearest to one."""
+"""Free-form flanks, whose table values are the parameters, and the nearest tip relief of a named curve."""
 
 from collections.abc import Callable, Mapping
 from functools import partial
@@ -39,7 +39,7 @@ _RTOL = 1e-3  # a search ends where the predicted decrease is below this part of
 
 
 class _Tables(eqx.Module):
-    """Design of two tables, from the pitch points to the tips; the parameters are their values.
+    """Design of two tables from the pitch points to the tips, whose values are the parameters.
 
     Attributes:
         roll: roll lengths of pinion and wheel [mm], shape (2, points).
@@ -48,29 +48,29 @@ class _Tables(eqx.Module):
     roll: Float[Array, "2 points"]
 
     def __call__(self, parameters: Parameters):
-        """Both tables, of the parameters in the order of their names."""
+        """Tables (pinion, wheel) from the parameters in the order of their names [um]."""
         values = jnp.stack(list(parameters.values())).reshape(self.roll.shape)
         return TabulatedProfile(self.roll[0], values[0]), TabulatedProfile(self.roll[1], values[1])
 
 
 class FreeForm(Checked, AbstractSearch):
-    """Flanks of any form with the least PPTE, or the best of something else, by sequential linear programming.
+    """Free-form flanks with the least PPTE, or another best objective, by sequential linear programming.
 
-    Each flank is a table of material removed from the pitch point to the tip, linear in between. What pinion and wheel
-    remove where they touch adds up, so that two addenda reach every point of the path of contact. The penalty on the
-    largest curvature keeps the flanks smooth and the local contact pressure down: 1 um/mm^2 is 0.001 / mm, to be
-    compared with the curvature of the pair, 1 / R.
+    Each flank is a table of material removed from the pitch point to the tip, linear between its points. The amounts of
+    pinion and wheel add up in the contact: modifications of both addenda cover the whole path of contact. The penalty
+    on the largest curvature keeps the flanks smooth and limits the local contact pressure: 1 um/mm^2 is 0.001 / mm, to
+    be compared with the relative curvature of the pair, 1 / R.
 
-    The values of the tables are its variables, in place of those of the problem. The objective of its optimum includes
-    the penalty. Material that a flank loses alike all over, and no variation shows, is not removed, unless constraints
-    may depend on it.
+    The values of the tables are the variables, in place of those of the problem. The objective of the optimum includes
+    the penalty. An amount that is constant over a flank has no effect on PPTE; it is subtracted, unless the problem has
+    constraints.
 
     Attributes:
-        points: values per flank.
+        points: number of table values per flank.
         max_relief: largest material removed.
         curvature: penalty on the largest second derivative of either table, PPTE in um per um/mm^2.
-        steps: most steps.
-        start: modifications to start from besides unmodified flanks; None for the rule-based relief.
+        steps: largest number of steps.
+        start: modifications of a second search, in addition to unmodified flanks; None for the rule-based relief.
     """
 
     name: ClassVar[str] = "free_form"
@@ -96,7 +96,7 @@ class FreeForm(Checked, AbstractSearch):
         )
 
     def search(self, problem: Problem, record: Record) -> None:
-        """Advances two searches, from unmodified flanks and from the start."""
+        """Run two searches, from unmodified flanks and from `start`."""
         mesh, load, start = problem.mesh, problem.conditions.load, self.start
         if start is None:
             relief = iso_relief(mesh.pair, float(load.torques[int(np.argmax(load.weights))]))
@@ -107,12 +107,12 @@ class FreeForm(Checked, AbstractSearch):
         follow(record.linearizer, record, starts, steps=self.steps, rtol=_RTOL)
 
     def polish(self, problem: Problem, record: Record, point: np.ndarray) -> None:
-        """Searches again from the design."""
+        """Search again from the design at a point of the unit box."""
         linearizer = record.linearizer or Linearizer(problem, 1)
         follow(linearizer, record, [Search(point)], steps=self.steps, rtol=_RTOL)
 
     def finish(self, record: Record) -> None:
-        """Gives back what both flanks have in common, unless constraints may depend on it."""
+        """Subtract the smallest amount of each flank from its table, unless the problem has constraints."""
         if not record.problem.constraints:
             flanks = record.point.reshape(2, self.points)
             record.point = (flanks - flanks.min(axis=1, keepdims=True)).ravel()
@@ -133,7 +133,7 @@ def _roughness(roll, max_relief: float, curvature: float) -> Roughness:
 
 
 def _values(mesh: Mesh, roll, start) -> np.ndarray:
-    """Values of the tables of the modifications to start from [um]."""
+    """Table values of the modifications at the start [um]."""
     return np.concatenate([removed_at(side, flank, where) for side, flank, where in zip(mesh.sides, start, roll)])
 
 
@@ -161,15 +161,15 @@ CURVES: Mapping[str, _Shape] = MappingProxyType(
 
 
 class Projection(eqx.Module):
-    """Flanks of a named curve in place of others.
+    """Tip reliefs of a named curve fitted to other flanks.
 
     Attributes:
-        curve: its name.
+        curve: name of the curve.
         pinion, wheel: tip reliefs.
-        cycle: mesh cycle with them, under the torque of the original.
+        cycle: mesh cycle with the tip reliefs, under the torque of the original flanks.
         ppte: peak-to-peak transmission error [um].
-        loss: by how much it is larger than that of the original flanks [um].
-        misfit: largest distance from the original flanks, from the pitch points to the tips [um].
+        loss: increase of the PPTE over the original flanks [um].
+        misfit: largest deviation from the original flanks, from the pitch points to the tips [um].
     """
 
     curve: str = eqx.field(static=True)
@@ -188,13 +188,13 @@ class Projection(eqx.Module):
 
 
 def project(optimum: Optimum, curve: str = "power") -> Projection:
-    """Fits a tip relief of a named curve to each flank of an optimum, by least squares from the pitch point to the tip.
+    """Fit a tip relief of a named curve to each flank of an optimum, by least squares from the pitch point to the tip.
 
-    This is what grinding and drawings need of a free-form or iterated flank: an amount, a length and a form. The fit
-    minimizes the distance of the flanks, not the PPTE: `minimize` with the same curve finds a better one.
+    Grinding and drawings need an amount, a length and a curve in place of a free-form or iterated flank. The fit
+    minimizes the deviation of the flanks, not the PPTE: `minimize` with the same curve finds a lower PPTE.
 
     Args:
-        optimum: of `FreeForm` or `TransmissionErrorIteration`.
+        optimum: optimum of `FreeForm` or `TransmissionErrorIteration`.
         curve: "linear", "power", "parabolic_linear", "quadratic" or "cubic".
 
     Raises:
@@ -212,7 +212,7 @@ def project(optimum: Optimum, curve: str = "power") -> Projection:
 
 
 def _fit(side: Side, modification: AbstractModification, curve: str):
-    """The best relief of one gear, and its largest distance from the flank."""
+    """Best tip relief of one gear, and its largest deviation from the flank [um]."""
     _, first, low, high = CURVES[curve]
     roll = jnp.linspace(side.pitch_roll_length, side.tip_roll_length, _SAMPLES)
     addendum = float(roll[-1] - roll[0])

@@ -19,14 +19,15 @@ Scalar = Float[Array, ""]
 Violation = jax.Array | np.ndarray | float
 Objective = str | Quantity | Callable[[MeshCycle], Any]
 
-# Searches aim at this part of a limit (of 1 where the limit is zero) inside it, and count an excess from there: what is
-# found at the positions of one mesh keeps the limit between them, too.
+# Safety margin, relative to the limit (to 1 if the limit is zero), from which searches count an excess: peaks between
+# the
+# positions of the mesh stay within the limit.
 FEASIBLE = 5e-4
 _KEPT = 0.5 * FEASIBLE  # up to this excess a design of a search counts as one that keeps its limits
 
 
 def counted(violation: Violation) -> Violation:
-    """A violation as designs are compared by it: one within the tolerance is none."""
+    """Violation for the comparison of designs: zero within the tolerance."""
     where = jnp.where if isinstance(violation, jax.Array) else np.where
     return where(violation <= _KEPT, 0.0, violation)
 
@@ -87,7 +88,7 @@ class Constraint(Checked):
         return [(sign, limit) for sign, limit in ((1, self.high), (-1, self.low)) if limit is not None]
 
     def margin(self, limit: Scalar, dtype: DTypeLike) -> Scalar | float:
-        """How far inside a limit a search aims, relative to it: not at all where a free parameter is limited."""
+        """Safety margin of a search inside a limit, relative to the limit; zero for limits on free parameters."""
         if self.quantity is None:
             return 0.0
         if self.low is None or self.high is None:

@@ -20,12 +20,12 @@ STAGE_WIDTHS = (0.5, 0.2, 0.1, 0.05, 0.02, 0.01)
 # smooth over this part of the width of the extremes.
 _PENALTY, _ROUNDED = 30.0, 0.05
 _LEAST_SCALE = 1e-3  # [um] of the objective, where the start is best already
-_LONGEST = 20  # steps of Adam between two looks at it
+_LONGEST = 20  # steps of Adam between two reports
 _FIRST_RATE, _LAST_RATE = 0.05, 0.002  # its step sizes in the unit box
 
 
 def _softened(problem: Problem, x, width, scale):
-    """Soft objective with the penalty at one point, with its true value and violation."""
+    """Soft objective with penalty at one point, and the true objective and violation."""
     values, true, excess, fine = problem.soft_and_true(x, width * scale)
     good = fine & jnp.isfinite(jnp.sum(values))
     passed, rounded = jnp.maximum(excess, 0.0), _ROUNDED * width
@@ -43,7 +43,9 @@ def _scale(start: Score) -> float:
 
 
 class Adam(Checked, AbstractSearch):
-    """Adam (optax) from many points at once, on a soft objective whose width shrinks in stages, moved into the box.
+    """Adam (optax) from many start points at once, on a soft objective whose width shrinks in stages.
+
+    Points outside the box are moved to its surface.
 
     Attributes:
         starts: number of start points; the first is the middle of the box.
@@ -71,7 +73,7 @@ class Adam(Checked, AbstractSearch):
 
 @kernel
 def _adam(problem: Problem, points, scale, width, rate, *, steps: int):
-    """Points after some steps, and all that were met, with value and violation."""
+    """Points after `steps` steps, and all evaluated points with objective and violation."""
     import optax
 
     adam = optax.scale_by_adam()

@@ -1,4 +1,4 @@
-"""The transmission error taken off the flank, again and again, until it is level."""
+"""Iteration that removes the variation of the transmission error from the flanks until it is constant."""
 
 import time
 from collections.abc import Mapping
@@ -25,7 +25,7 @@ from .result import Iterate, Limit, Optimum
 
 
 class IteratedFlanks:
-    """Both flanks: the modifications of the start, and what is taken off beside them in the contact points."""
+    """Flanks of the iteration: initial modifications plus further material removed at the contact points."""
 
     def __init__(self, mesh: Mesh, pinion: AbstractModification, wheel: AbstractModification, most: float) -> None:
         contact = mesh.path_of_contact
@@ -64,7 +64,7 @@ class IteratedFlanks:
         return made[0], made[1]
 
     def take_off(self, missing: np.ndarray, alone: np.ndarray) -> None:
-        """Takes off what is missing to the level at every position [um]; where there is too much, gives back."""
+        """Remove the difference to the level at every position [um]; a negative difference adds material back."""
         at_path = np.interp(self._path / self._pitch, self._phase, missing, period=1.0)
         for index, outwards in enumerate((1.0, -1.0)):
             depth = outwards * self._path
@@ -89,13 +89,13 @@ _HALVINGS = 5  # of the range of slants: the slant is the least one within 1/16
 
 
 class Levelled(NamedTuple):
-    """All states of an iteration.
+    """States of an iteration.
 
     Attributes:
-        iterates, cycles: of every state.
-        pressures: largest pressure of every state, on the mesh that judges it [MPa].
-        reached: least PPTE so far within the limit of the pressure [um].
-        best: number of the state that is the result.
+        iterates, cycles: summary and mesh cycle of every state.
+        pressures: largest pressure of every state, on the meshes of `Pressure` [MPa].
+        reached: lowest PPTE so far within the limit of the pressure [um].
+        best: index of the state that is the result.
     """
 
     iterates: list[Iterate]
@@ -107,12 +107,12 @@ class Levelled(NamedTuple):
 
 @dataclass(frozen=True)
 class Pressure:
-    """Largest pressure of flanks and tip edges against its limit, on meshes that together are a finer one.
+    """Largest pressure of flanks and tip edges against its limit, on meshes whose positions together are a fine mesh.
 
     Attributes:
-        limit: None without.
-        torque: on the pinion [N m].
-        meshes: the first is that of the iteration.
+        limit: limit of the pressure; None for no limit.
+        torque: torque on the pinion [N m].
+        meshes: meshes with interleaved positions; the first is the mesh of the iteration.
     """
 
     limit: Constraint | None
@@ -120,7 +120,8 @@ class Pressure:
     meshes: list[Mesh]
 
     def largest(self, pinion: AbstractModification, wheel: AbstractModification, cycle: MeshCycle | None) -> float:
-        """The largest pressure [MPa]; the cycle of the first mesh is known, or None."""
+        """Largest pressure of flanks and tip edges [MPa]; `cycle` is the solution on the first mesh, None to solve it.
+        """
         cycles = [] if cycle is None else [cycle]
         cycles += [_solve(mesh, self.torque, pinion, wheel) for mesh in self.meshes[len(cycles) :]]
         # a contact is on the flank or at the tip edge, and zero in the other field
@@ -131,11 +132,11 @@ class Pressure:
         return 0.0 if self.limit is None else max(0.0, *map(float, self.limit.excess(jnp.asarray(pressure))))
 
     def passed(self, pressure: float) -> float:
-        """The excess that counts."""
+        """Relative excess of a pressure over the limit, zero within the tolerance."""
         return float(counted(self.excess(pressure)))
 
     def holds_between(self, found: Levelled, mesh: Mesh) -> bool:
-        """Whether the result keeps the limit at four times the positions of the mesh as well."""
+        """True if the result also meets the limit at four times the positions of the mesh."""
         best, pressure = found.iterates[found.best], found.pressures[found.best]
         count = self.meshes[0].resolution.positions
         between = replace(self, meshes=[part for number in (1, 2, 3) for part in parts(later(mesh, number / 4), count)])
@@ -153,7 +154,7 @@ def levelled(
     spent: list[int],
     callback: Callback | None,
 ) -> Levelled:
-    """Runs the iteration; appends the contact analyses of every step to those that were spent."""
+    """Run the iteration; appends the number of contact analyses of every step to `spent`."""
     found = Levelled([], [], [], [], 0)
     level = float("nan")
     for step in range(steps + 1):
@@ -179,7 +180,7 @@ def levelled(
 def _least_slant(
     mesh: Mesh, flanks: IteratedFlanks, pressure: Pressure, *, limited: bool
 ) -> tuple[AbstractModification, AbstractModification, MeshCycle, float, int]:
-    """Both flanks with the least slant that keeps the pressure, or else the least pressure; solved, by how many."""
+    """Flanks with the least slant within the pressure limit, or with the least pressure; and the analyses spent."""
     tried: dict[float, tuple[Any, ...]] = {}
 
     def passed(slant: float) -> float:
@@ -216,7 +217,7 @@ def _solve(mesh: Mesh, torque, pinion: AbstractModification, wheel: AbstractModi
 
 
 def _alone(cycle: MeshCycle) -> np.ndarray:
-    """Positions where one pair alone carries the load, on unmodified flank."""
+    """Indices of positions where a single pair carries the load on unmodified flanks."""
     error = np.asarray(cycle.transmission_error)
     loaded = np.asarray(cycle.pair_force) > _LOADED * float(cycle.force)
     single = loaded.sum(axis=0) == 1
@@ -241,41 +242,40 @@ def _iterate(mesh: Mesh, cycle: MeshCycle, alone: np.ndarray, pinion, wheel) -> 
 
 
 class TransmissionErrorIteration(Checked, AbstractMethod):
-    """Iteration that levels the transmission error by taking it off the flanks.
+    """Iteration that levels the transmission error by removing its variation from the flanks.
 
-    While one pair alone carries the load its deflection is given. Where two pairs share it the gears lag less, by
-    h = q_max - q: that much is taken off both flanks there, off the pinion in recess and off the wheel in approach, so
-    that both pairs yield by it. It starts where the transmission error leaves its single-contact extreme, and is
-    repeated with the flanks so made, because pairs that meet beyond the path of contact come in later the more is
-    taken off.
+    The deflection in single contact is given. In double contact the transmission error is smaller by h = q_max - q:
+    this amount is removed from both pairs, from the pinion in recess and from the wheel in approach. The relief starts
+    where the transmission error leaves its single-contact extreme. The step is repeated with the new flanks, because
+    the contact of pairs beyond the path of contact begins the later, the more material is removed.
 
     Source: eq. (1) and the algorithm of "Design for manufacturing of a spur gears profile modification based on the
     static transmission error for improving the dynamic behavior", Int J Adv Manuf Technol 2023,
-    doi 10.1007/s00170-023-12340-x, with the sign of its q_0 turned. There the total h is cut off at zero, and so it is
-    here: where a step has taken off too much, the next one gives back. The level q_max is that of the first state,
-    since the single contact of unmodified flanks does not change; the study takes its lower limit of the PPTE from
-    there as well.
+    doi 10.1007/s00170-023-12340-x, with the opposite sign of its q_0. As in the paper the total h is limited to values
+    above zero: if a step has removed too much, the next one adds material back. The level q_max is that of the first
+    state, since the single contact of unmodified flanks does not change; the paper takes its lower limit of the PPTE
+    from the first state as well.
 
-    Of equal reliefs on both pairs, a plateau up to the tip is left: the tip edges meet the mates as before. But the
-    gears lag by the sum of both gaps, weighted by the stiffnesses of the pairs, so that any other share between the
-    pair that leaves and the one that enters is as level ("infinite solutions with equal peak-to-peak transmission
-    error"). With `max_pressure`, the relief is slanted: from the first double contact (u = 0) to the tip (u = 1) it is
-    multiplied by 1 + t (2 u - 1), not less than 0, with the least slant t from 0 to 2 that keeps the pressure of flanks
-    and tip edges within that limit. The height at the tip follows from the pressure, as it does in the study.
+    With equal reliefs on both pairs the relief has a plateau up to the tip, and corner contact remains. The
+    transmission error depends on the sum of both gaps, weighted by the stiffnesses of the pairs: other distributions
+    between the leaving and the entering pair are equally level ("infinite solutions with equal peak-to-peak
+    transmission error"). With `max_pressure` the relief is slanted: from the first double contact (u = 0) to the tip
+    (u = 1) it is multiplied by 1 + t (2 u - 1), not less than 0, with the least slant t from 0 to 2 that keeps the
+    pressure of flanks and tip edges within the limit. The amount at the tip follows from the pressure, as in the paper.
 
-    Its optimum is the state with the least PPTE of those within the limit of the pressure, or else with the least
-    pressure; `Optimum.iterations` has all of them. The pressure is judged on a finer mesh of `positions`, doubled until
-    its limit is kept at four times as many, too; all else on the mesh of the problem.
+    The optimum is the state with the lowest PPTE within the pressure limit, or else the state with the lowest pressure;
+    `Optimum.iterations` contains all states. The pressure is evaluated on a finer mesh of `positions`, which is refined
+    until the limit is also met at four times its positions; everything else is evaluated on the mesh of the problem.
 
     Attributes:
-        start: flanks of the first step: involutes ("unmodified", the study's type 1), the design of a problem without
-            variables ("given", its type 2), or the one of its variables with the least contact pressure
-            ("low_pressure", its type 3).
-        max_relief: most that is left removed anywhere, by the start too.
+        start: flanks of the first step: involutes ("unmodified", type 1 of the paper), the design of a problem without
+            variables ("given", type 2), or the design of its variables with the least contact pressure
+            ("low_pressure", type 3).
+        max_relief: largest total material removed, the start included.
         max_pressure: largest pressure of flanks and tip edges; None for no limit.
-        rtol: ends the iteration where PPTE is within this part of its lower limit, or has fallen by less than
-            this part of itself.
-        steps: most steps.
+        rtol: relative tolerance: the iteration ends when PPTE is within this part of its lower limit, or decreases by
+            less than this part.
+        steps: largest number of steps.
         search: method of the search for the start of low pressure.
     """
 
@@ -291,7 +291,7 @@ class TransmissionErrorIteration(Checked, AbstractMethod):
     def find(
         self, problem: Problem, *, positions: int | None, rounding: Mapping[str, float], callback: Callback | None
     ) -> Optimum:
-        """Runs the iteration.
+        """Run the iteration.
 
         Raises:
             ValueError: for several torques, manufactured gears, constraints, another objective than PPTE, or rounding.
@@ -357,7 +357,7 @@ class TransmissionErrorIteration(Checked, AbstractMethod):
     def _first(
         self, problem: Problem, callback: Callback | None
     ) -> tuple[AbstractModification, AbstractModification, int]:
-        """The flanks of the first step, and the contact analyses that they took."""
+        """Flanks of the first step, and the number of contact analyses to find them."""
         if self.start == "unmodified":
             return NoModification(), NoModification(), 0
         if self.start == "given":

@@ -1,9 +1,9 @@
 """Linearizations of a problem at many points, and the best step of a linearized problem as a linear program.
 
-A peak-to-peak value is the largest minus the smallest of many smooth values. Linearized one by one, their extremes stay
-exact extremes, so that kinks, which stop a gradient method, are part of the model (K. Madsen, J. Inst. Maths Applics 16
-(1975) 321). Mean, worst case and conditional value at risk over the cases are linear programs too (Rockafellar and
-Uryasev 2000, doi 10.21314/JOR.2000.038); other measures keep the shares that the cases have at the point.
+A peak-to-peak value is the largest minus the smallest of many smooth values. Each value is linearized separately and
+the extremes stay exact, so that the model contains the kinks that stop a gradient method (K. Madsen, J. Inst. Maths
+Applics 16 (1975) 321). Mean, worst case and conditional value at risk over the cases are linear programs too
+(Rockafellar and Uryasev 2000, doi 10.21314/JOR.2000.038); other measures use the weights of the cases at the point.
 """
 
 from abc import ABC, abstractmethod
@@ -25,15 +25,15 @@ from .problem import Problem, real_points
 
 
 class Linearizer:
-    """Linearizes at points of the unit box, on the host.
+    """Linearize a problem at points of the unit box.
 
-    A problem on a fine mesh is linearized on meshes of fewer positions that together have its own, where all that it
-    asks for are extremes over the positions: a search that goes on there needs no other program.
+    If a problem contains only extremes over the positions, a fine mesh is split into meshes of fewer positions: a
+    search that continues on the fine mesh reuses the compiled program.
 
     Args:
         problem: the problem.
-        batch: most points at once; the program is compiled for so many.
-        positions: for which it is compiled; None for those of the mesh.
+        batch: number of points per call of the compiled program.
+        positions: number of positions of the compiled program; None for the number of the mesh.
     """
 
     def __init__(self, problem: Problem, batch: int, positions: int | None = None) -> None:
@@ -43,15 +43,15 @@ class Linearizer:
         self._parts = [problem.on(mesh) for mesh in meshes] if len(meshes) > 1 else [problem]
 
     def on(self, problem: Problem) -> "Linearizer":
-        """Linearizer of the problem on another mesh, in parts of as many positions to reuse the program."""
+        """Linearizer of the problem on another mesh, split into the same number of positions to reuse the program."""
         return Linearizer(problem, self.batch, self._positions)
 
     def __call__(self, points: np.ndarray) -> list[Linearization]:
-        """The linearization at every point."""
+        """Linearizations at points of the unit box, shape (points, parameters)."""
         return [_joined(each) for each in self._at_parts(points)]
 
     def at_more_positions(self, points: np.ndarray) -> list[tuple[Linearization, Linearization]] | None:
-        """Linearizations at two and at four times the positions, by the same program; None where there is none."""
+        """Linearizations at two and four times the positions by the same program; None if not all are extremes."""
         if not self.problem.is_made_of_extremes:
             return None
         half, *quarters = (self.on(self.problem.on(later(self.problem.mesh, share))) for share in (0.5, 0.25, 0.75))
@@ -76,7 +76,7 @@ class Linearizer:
 
 
 def _joined(each: list[Linearization]) -> Linearization:
-    """The linearization over all positions from those over some."""
+    """Linearization over all positions, joined from linearizations over parts of the positions."""
     if len(each) == 1:
         return each[0]
     objectives = tuple(map(_together, zip(*(part.objectives for part in each))))
@@ -115,8 +115,8 @@ class Step(NamedTuple):
     """Solution of the linear program.
 
     Attributes:
-        step: in the unit box, shape (parameters,).
-        decrease: of the penalized objective that the model predicts.
+        step: step in the unit box, shape (parameters,).
+        decrease: predicted decrease of the penalized objective.
     """
 
     step: np.ndarray
@@ -124,10 +124,10 @@ class Step(NamedTuple):
 
 
 class AbstractScalarization(ABC):
-    """Makes one number of several objectives: the largest of scaled ones, plus a part of the sum of all.
+    """Scalarization of several objectives: the largest scaled objective plus `part` times the sum of all.
 
     Attributes:
-        part: of the sum.
+        part: factor of the sum.
     """
 
     part: float
@@ -144,7 +144,7 @@ class AbstractScalarization(ABC):
 
 
 class NoObjective(AbstractScalarization):
-    """Nothing but the violation of the limits is left to be made small."""
+    """Zero objective, for searches that minimize only the violation of the limits."""
 
     part = 0.0
 
@@ -152,22 +152,22 @@ class NoObjective(AbstractScalarization):
         self._none = np.zeros(objectives)
 
     def scales(self) -> tuple[np.ndarray, np.ndarray]:
-        """Zeros."""
+        """Zero factor and offset of every objective."""
         return self._none, self._none
 
 
 class LinearModel:
-    """A linearization on the host with what the problem says about it.
+    """Linear model of a problem at a point: objectives, limits, measures over cases, and penalty.
 
     Args:
         problem: the problem.
-        x: point of the unit box.
-        linearization: of the problem at that point.
-        scalarization: of several objectives; None for one.
-        penalty: of a relative violation of 1; None to size it by the objective at the point.
+        x: point of the unit box, shape (parameters,).
+        linearization: linearization of the problem at the point.
+        scalarization: scalarization of several objectives; None for a single one.
+        penalty: penalty of a relative violation of 1; None to scale it by the objective at the point.
 
     Attributes:
-        values: objectives at the point; inf where a contact solution behind them failed.
+        values: objectives at the point, shape (objectives,); inf if a contact has not converged.
     """
 
     def __init__(
@@ -192,7 +192,7 @@ class LinearModel:
 
     @property
     def fine(self) -> bool:
-        """Whether every contact solution behind it converged."""
+        """True if all contact solutions have converged and all values are finite."""
         return bool(self._lin.fine)
 
     @property
@@ -215,7 +215,7 @@ class LinearModel:
         return self.value + self.penalty * self.violation
 
     def best_step(self, radius: float) -> Step:
-        """The step of the largest predicted decrease within a distance in every parameter and within the unit box."""
+        """Step with the largest predicted decrease within `radius` of every parameter and within the unit box."""
         x = self._x
         low, high = np.maximum(-radius, -x), np.minimum(radius, 1 - x)
         program = _Program(len(x))
@@ -238,9 +238,10 @@ class LinearModel:
         return Step(step, self.merit - predicted - offset)
 
     def optimality(self, reach: float) -> float:
-        """Fastest decrease of the objective that is left, per unit of distance; NaN where no slopes are known.
+        """First-order optimality: largest predicted decrease over a distance `reach`, divided by it; NaN without
+        slopes.
 
-        A constraint that is passed within the tolerance counts as met exactly: to meet it costs or gains nothing.
+        A constraint that is violated within the tolerance counts as met exactly.
         """
         if not self.fine:
             return np.nan
@@ -249,7 +250,7 @@ class LinearModel:
         return max(settled.best_step(reach).decrease / reach, 0.0)
 
     def _measured_cases(self) -> tuple[list[np.ndarray], np.ndarray]:
-        """Shares of the cases in every objective, and the objectives."""
+        """Weights of the cases in every objective, and the values of the objectives."""
         if not self.fine:
             return [], np.full(len(self._lin.objectives), np.inf)
         cases = [pieces.value for pieces in self._lin.objectives]
@@ -257,7 +258,7 @@ class LinearModel:
         return shares, np.asarray([share @ each for share, each in zip(shares, cases)])
 
     def _cost(self, program: "_Program", low, high) -> tuple[dict[int, float], float]:
-        """Coefficients of the one number in the variables, and its constant."""
+        """Coefficients of the scalarized objective over the variables, and its constant."""
         pairs = zip(self._lin.objectives, self._shares)
         each = [self._measured(program, pieces, shares, low, high) for pieces, shares in pairs]
         if self._scalarization is None:
@@ -273,7 +274,7 @@ class LinearModel:
         return cost, constant
 
     def _measured(self, program: "_Program", pieces: Pieces, shares: np.ndarray, low, high) -> dict[int, float]:
-        """Coefficients of an objective in the variables, with the rows that the measure needs."""
+        """Coefficients of an objective over the variables; adds the rows of the measure to the program."""
         measure = self._measure
         weights = self._weights if isinstance(measure, Worst | CVaR) else shares
         carrying = np.flatnonzero(weights > 0)
@@ -302,27 +303,27 @@ def _shares(measure: AbstractMeasure, values, weights):
 
 
 def _settled(pieces: Pieces) -> Pieces:
-    """Pieces of a limit; where it is passed within the tolerance it is met exactly."""
+    """Pieces of a limit, shifted so that a violation within the tolerance is zero."""
     excess = pieces.value
     passed = np.where((excess > 0) & (excess <= FEASIBLE), excess, 0.0)
     return pieces._replace(upper=pieces.upper - passed[:, None])
 
 
 def _span(program: "_Program", pieces: Pieces, case: int, low, high) -> Mapping[int, float]:
-    """Variables above all upper and below all lower pieces of a case, with their signs in the number."""
+    """Bounds of the upper and the lower pieces of a case as variables, with their signs in the value."""
     (top,) = program.variables(1)
     _below(program, Pieces(pieces.upper, pieces.slope), case, low, high, top)
     return {top: 1.0, **_bottom(program, pieces, case, low, high)}
 
 
 def _below(program: "_Program", pieces: Pieces, case: int, low, high, bound: int) -> None:
-    """Rows that keep the number of a case below a variable."""
+    """Add rows that keep the value of a case below a variable."""
     values, slope = _reachable(pieces.upper[case], pieces.slope[case], low, high)
     program.at_most(slope, -values, {bound: -1.0, **_bottom(program, pieces, case, low, high)})
 
 
 def _bottom(program: "_Program", pieces: Pieces, case: int, low, high) -> dict[int, float]:
-    """A variable below all lower pieces of a case, where there are any."""
+    """Add a variable below all lower pieces of a case; empty without lower pieces."""
     if pieces.lower is None or pieces.lower_slope is None:
         return {}
     (bottom,) = program.variables(1)
@@ -332,7 +333,7 @@ def _bottom(program: "_Program", pieces: Pieces, case: int, low, high) -> dict[i
 
 
 def _reachable(values, slope, low, high):
-    """Pieces without those that no step within reach makes the largest."""
+    """Pieces that can become the largest for some step between `low` and `high`."""
     most = values + np.maximum(slope * low, slope * high).sum(axis=1)
     least = values + np.minimum(slope * low, slope * high).sum(axis=1)
     near = most >= least.max()
@@ -361,7 +362,7 @@ class _Program:
         self._limits.append(np.asarray(limit))
 
     def solve(self, cost: dict[int, float], low, high) -> tuple[np.ndarray, float] | None:
-        """The step and the optimal cost; None when the solver gives up."""
+        """Optimal step and cost; None if the solver fails."""
         size = self.parameters + len(self._lows)
         matrix = np.zeros((sum(map(len, self._limits)), size))
         start = 0

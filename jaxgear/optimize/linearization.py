@@ -17,11 +17,12 @@ Either = Array | np.ndarray  # traced, and taken to the host for a linear progra
 
 
 class Pieces(NamedTuple):
-    """A number in every case, max(upper) - min(lower), with its slopes over the unit box.
+    """Piecewise linear value in every case, max(upper) - min(lower), with slopes over the unit box.
 
     Attributes:
-        upper: shape (cases, pieces), with `slope`, shape (cases, pieces, parameters).
-        lower: the same with `lower_slope`; None where nothing is subtracted.
+        upper: values of the upper pieces, shape (cases, pieces); their slopes are `slope`, shape (cases, pieces,
+            parameters).
+        lower: values of the lower pieces, with slopes `lower_slope`; None for a value max(upper).
     """
 
     upper: Float[Either, "cases pieces"]
@@ -31,12 +32,12 @@ class Pieces(NamedTuple):
 
     @property
     def value(self) -> Float[Either, " cases"]:
-        """The number in every case."""
+        """Value in every case, max(upper) - min(lower), shape (cases,)."""
         top = self.upper.max(axis=1)
         return top if self.lower is None else top - self.lower.min(axis=1)
 
     def scaled(self, scale: Either | float, offset: Either | float) -> "Pieces":
-        """The number divided by a positive scale, after an offset has been taken off."""
+        """Pieces of (value - offset) / scale, with a positive scale."""
         return Pieces(
             (self.upper - offset) / scale,
             self.slope / scale,
@@ -46,12 +47,12 @@ class Pieces(NamedTuple):
 
 
 class Linearization(NamedTuple):
-    """Objectives and constraints at a point, linear piece by piece.
+    """Piecewise linear objectives and constraints at a point.
 
     Attributes:
-        objectives: of every objective its pieces.
-        limits: the pieces of by how much each limit is passed, relative to it.
-        fine: whether all contact solutions converged and all numbers and slopes are finite.
+        objectives: pieces of every objective.
+        limits: pieces of the relative excess over every limit.
+        fine: True if all contact solutions have converged and all values and slopes are finite.
     """
 
     objectives: tuple[Pieces, ...]
@@ -63,8 +64,8 @@ class Sloped(NamedTuple):
     """Values that a quantity reduces, with their slopes.
 
     Attributes:
-        values: shape (..., values).
-        slopes: shape (..., values, parameters).
+        values: values, shape (..., values).
+        slopes: slopes of the values over the unit box, shape (..., values, parameters).
     """
 
     values: Float[Array, "... values"]
@@ -72,7 +73,7 @@ class Sloped(NamedTuple):
 
 
 def pieces_of(quantity: Quantity, sloped: Sloped, sign: int) -> Pieces:
-    """Pieces of `sign` times a quantity, cases leading: exact where its reduction is made of extremes."""
+    """Pieces of `sign` times a quantity, leading axis (cases,); exact if the quantity is made of extremes."""
     values, slopes = sloped
     factors = quantity.reduction.factors(sign)
     if factors is None:
@@ -88,16 +89,17 @@ def pieces_of(quantity: Quantity, sloped: Sloped, sign: int) -> Pieces:
 def local_slopes(
     quantities: Sequence[Quantity], solve: Callable[[Any], Analysis], removed_of: Callable[..., Any], x: Vector
 ) -> tuple[list[Sloped], Bool[Array, ""]]:
-    """Values and slopes of local quantities.
+    """Values and slopes of local quantities, and True if the contact has converged.
 
-    Their values at a position depend on the material removed at that position alone: one gradient of the contact
-    analysis, of the sum over the positions, gives the slopes at all of them.
+    The value of a local quantity at a position depends only on the material removed at that position: one gradient of
+    the contact analysis, for the sum over the positions, gives the slopes at all positions.
 
     Args:
-        quantities: local ones.
-        solve: analyzes the material removed.
-        removed_of: material removed at a point of the unit box: fields of shape (pairs, slices or 1, positions).
-        x: the point.
+        quantities: local quantities.
+        solve: function that analyses material removed.
+        removed_of: function that returns the material removed at a point of the unit box, fields of shape (pairs,
+            slices or 1, positions).
+        x: point of the unit box, shape (parameters,).
     """
 
     def material(x):
@@ -132,7 +134,7 @@ def local_slopes(
 
 
 def _along(share, slope, axes: str) -> Float[Array, "... positions parameters"]:
-    """Derivatives by every field of the material removed, along those of the fields by the parameters."""
+    """Derivatives by the parameters from the derivatives by the fields of the material removed (chain rule)."""
     each = [jnp.einsum(axes, *both) for both in zip(jax.tree.leaves(share), jax.tree.leaves(slope))]
     return reduce(jnp.add, each)
 
@@ -140,7 +142,7 @@ def _along(share, slope, axes: str) -> Float[Array, "... positions parameters"]:
 def any_slopes(
     quantities: Sequence[Quantity], analyze: Callable[[Vector], Analysis], x: Vector
 ) -> tuple[list[Sloped], Bool[Array, ""]]:
-    """Values and slopes of any quantities, and whether the contact of the point that `analyze` takes converged."""
+    """Values and slopes of any quantities at a point that `analyze` takes, and True if the contact has converged."""
 
     def numbers(x):
         analysis = analyze(x)

@@ -26,37 +26,37 @@ class AbstractMethod(eqx.Module):
     Most methods are an `AbstractSearch`.
     """
 
-    takes_variables: ClassVar[bool] = True  # False for a method that brings its own
+    takes_variables: ClassVar[bool] = True  # False for a method with its own variables
 
     @property
     @abstractmethod
     def name(self) -> str:
-        """Name in design files and tables."""
+        """Name of the method in design files and tables."""
 
     @abstractmethod
     def find(
         self, problem: Problem, *, positions: int | None, rounding: Mapping[str, float], callback: Callback | None
     ) -> Optimum:
-        """The best design of a problem; arguments as for `minimize`."""
+        """Find the best design of a problem; arguments as for `minimize`."""
 
 
 class AbstractSearch(AbstractMethod):
-    """A search of the unit box of a problem, which goes on from its best design on finer meshes."""
+    """Search of the unit box of a problem, continued from its best design on finer meshes."""
 
     @abstractmethod
     def search(self, problem: Problem, record: Record) -> None:
-        """Searches, leaving the best design in the record."""
+        """Search the box and store the best design in the record."""
 
     def pose(self, problem: Problem) -> Problem:
-        """The problem that is searched, where the method brings variables of its own."""
+        """Problem with the variables of the method; by default the problem itself."""
         return problem
 
     def polish(self, problem: Problem, record: Record, point: np.ndarray) -> None:
-        """Goes on from a design on a finer mesh; a method that follows no slopes just judges it there."""
+        """Continue from a design on a finer mesh; by default evaluate the design."""
         record.judge(point[None])
 
     def finish(self, record: Record) -> None:
-        """Last change of the best design, which does not change its objective."""
+        """Final change of the best design that keeps its objective; none by default."""
 
     def find(
         self, problem: Problem, *, positions: int | None, rounding: Mapping[str, float], callback: Callback | None
@@ -82,18 +82,18 @@ _POLISHED, _BESIDE = 4, 0.03  # searches on the finer mesh, and their reach abou
 
 
 class SLP(Checked, AbstractSearch):
-    """Trust-region sequential linear programming from many start points, then again from around the best design.
+    """Trust-region sequential linear programming from many start points, repeated around the best design.
 
-    Each step solves a linear program in which every position of the transmission error is linear and the extremes are
+    Each step solves a linear program in which the transmission error at every position is linear and the extremes are
     exact; see `linear_model`. It converges at the kinks where other gradient methods stall: a few dozen contact
-    analyses find a local optimum to many digits. It is local: of several optima it finds those near its starts, and
-    each round looks for a better one beside the best.
+    analyses find a local optimum to many digits. The method is local: it finds optima near its start points, and every
+    further round searches near the best design.
 
     Attributes:
-        starts: searches that advance together.
-        rounds: rounds of so many searches; the first starts all over the box, each further one around the best design.
-        steps: most steps of every search.
-        rtol: a search ends where the predicted decrease is below this part of the objective.
+        starts: number of searches that advance together.
+        rounds: number of rounds; the first one starts all over the box, each further one around the best design.
+        steps: largest number of steps of every search.
+        rtol: relative tolerance: a search ends if the predicted decrease is below this part of the objective.
     """
 
     name: ClassVar[str] = "slp"
@@ -103,7 +103,7 @@ class SLP(Checked, AbstractSearch):
     rtol: float = number("", low=0.0, high=1.0, open_low=True, open_high=True, static=True, default=1e-4)
 
     def search(self, problem: Problem, record: Record) -> None:
-        """Advances all searches of a round until none finds a better step."""
+        """Run all rounds; a round ends when no search finds a better step."""
         points = start_points(problem, self.starts)
         record.linearizer = Linearizer(problem, self.starts)
         for round_ in range(self.rounds):
@@ -119,7 +119,7 @@ class SLP(Checked, AbstractSearch):
             )
 
     def polish(self, problem: Problem, record: Record, point: np.ndarray) -> None:
-        """Searches again from the design and from a few points beside it."""
+        """Search again from the design and from a few points near it."""
         linearizer = record.linearizer or Linearizer(problem, _POLISHED)
         beside = points_nearby(point, _POLISHED - 1, reach=_BESIDE, seed=0)
         follow(linearizer, record, [Search(start) for start in (point, *beside)], steps=self.steps, rtol=self.rtol)

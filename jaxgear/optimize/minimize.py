@@ -13,8 +13,8 @@ from .problem import Problem
 from .refine import POSITIONS
 from .result import Optimum
 
-# Known by name, here and in design files, where the fields of a class are its options. A method of your own joins them
-# by `METHODS["name"] = Class`.
+# Methods by name, also for design files, where the fields of a class are its options. Add a method of your own by
+# `METHODS["name"] = Class`.
 METHODS: dict[str, type[AbstractMethod]] = {
     "slp": SLP,
     "adam": Adam,
@@ -36,25 +36,26 @@ def minimize(
     rounding: Mapping[str, float] = MappingProxyType({}),
     callback: Callback | None = None,
 ) -> Optimum:
-    """Finds the variables of the design with the least transmission error, or the best of something else.
+    """Find the variables of the best design of a problem.
 
     Args:
         problem: mesh, loads, design, bounds and objective.
         method: name of one of `METHODS`, such as "slp" (sequential linear programming); or a method with its
             options, such as `SLP(starts=8)`.
-        positions: of the finer mesh on which the search ends and its result is evaluated, at least those of the mesh.
-            An extreme over few positions is fitted to them: the true one lies in between. None to stay on the mesh.
-        rounding: steps of variables in which the result is wanted, by name and in the unit of their bounds, such as
-            `{"amount": 0.5}`: the best design found on multiples of them, see `Optimum.rounding`. Variables without a
-            step, and with 0, keep all digits.
+        positions: number of positions of the finer mesh on which the search ends and its result is evaluated, at least
+            the number of the mesh. An optimum on few positions fits these positions, and larger extremes lie between
+            them. None to stay on the mesh.
+        rounding: steps to which variables are rounded, by name and in the unit of their bounds, such as
+            `{"amount": 0.5}`: the result is the best design found on multiples of the steps, see `Optimum.rounding`.
+            Variables without a step, or with a step of 0, keep all digits.
         callback: called as callback(step, steps, best objective) between steps.
 
     Returns:
-        the best design met.
+        the best design found.
 
     Raises:
-        ValueError: for an unknown method, several objectives, and whatever the method refuses.
-        RuntimeError: when no design gave a converged contact solution.
+        ValueError: for an unknown method, several objectives, and problems that the method does not accept.
+        RuntimeError: if no design has a converged contact solution.
     """
     if isinstance(method, str):
         if method not in METHODS:

@@ -26,7 +26,7 @@ _SPAN = 1e-3  # least span of an objective over the designs, relative to its ide
 
 
 class Chebyshev(AbstractScalarization):
-    """Largest weighted distance from the ideal point, in spans of the objectives."""
+    """Scalarization by the largest weighted distance from the ideal point, in spans of the objectives."""
 
     part = _SUM
 
@@ -41,7 +41,7 @@ class Chebyshev(AbstractScalarization):
 
 
 class Met:
-    """Designs met so far that keep the constraints and that no other one beats."""
+    """Non-dominated designs so far that meet the constraints."""
 
     def __init__(self, record: Record, frame: tuple[np.ndarray, np.ndarray] | None = None) -> None:
         objectives = len(record.problem.objectives)
@@ -56,7 +56,7 @@ class Met:
 
     @property
     def found(self) -> bool:
-        """Whether there are any."""
+        """True if any design has been found."""
         return len(self._values) > 0
 
     def spend(self, designs: int, *, analyses: int) -> None:
@@ -64,14 +64,14 @@ class Met:
         self.record.spend(designs, analyses=analyses)
 
     def take(self, point: np.ndarray, model: LinearModel) -> None:
-        """Keeps a design until the next look."""
+        """Store a design until the next `look`, if it has converged and meets the constraints."""
         solved = bool(np.isfinite(model.values).all())
         self._solved |= solved
         if solved and not counted(model.violation):
             self._new.append((point, model.values))
 
     def look(self, step: int, steps: int) -> None:
-        """Sorts out what is new; ideal and span stay the same in between, so that steps can be compared."""
+        """Merge new designs into the front; ideal and span only change here, so that steps are comparable."""
         if self._new:
             points, values = (np.stack(part) for part in zip(*self._new))
             self._new = []
@@ -80,28 +80,28 @@ class Met:
             best = pareto_front(values)
             self._points, self._values = points[best], values[best]
             self._low = self._values.min(axis=0)
-            # as long as one design beats all others, the front has no span of its own
+            # while one design dominates all others, the front has no span
             high = self._values.max(axis=0) if len(self._values) > len(self._low) else self._worst
             self._span = np.maximum(high - self._low, _SPAN * np.maximum(np.abs(self._low), 1.0))
         self.record.report(step, steps, self.compromise()[1])
 
     def frame(self) -> tuple[np.ndarray, np.ndarray]:
-        """Ideal point, and the span of the objectives."""
+        """Ideal point and span of the objectives, shape (objectives,) each."""
         return self._low, self._span
 
     def weight(self, values: np.ndarray) -> np.ndarray:
-        """The weight by whose largest distance from the ideal point a design of these objectives is sought."""
+        """Weights of the Chebyshev scalarization that lead to given objectives, shape (objectives,)."""
         weight = 1 / np.maximum((values - self._low) / self._span, END)
         return weight / weight.sum()
 
     def best(self, way: Chebyshev) -> np.ndarray:
-        """The design of the least distance."""
+        """Design with the least scalarized distance, a point of the unit box."""
         return self._points[way.join(self._values).argmin()]
 
     def compromise(self) -> tuple[np.ndarray, float]:
-        """The design whose worst distance from the ideal, in spans of the front, is about the least; and that distance.
+        """Design with about the least largest distance from the ideal in spans of the front, and that distance.
 
-        The sum decides between designs of nearly the same worst distance.
+        The sum of the distances decides between designs of nearly the same largest distance.
         """
         if not self.found:
             return np.full(self._points.shape[1], 0.5), np.inf
@@ -109,10 +109,10 @@ class Met:
         return self._points[best], float(((self._values[best] - self._low) / self._span).max())
 
     def end(self, most: int) -> None:
-        """Keeps at most so many designs; where none keeps the limits, one that does is sought before.
+        """Reduce the front to at most `most` designs; without any design, first seek one that meets the limits.
 
         Raises:
-            RuntimeError: when no design keeps the constraints, or none has a converged contact solution.
+            RuntimeError: if no design meets the constraints, or none has a converged contact solution.
         """
         if not self._solved:
             self.record.check()
@@ -125,9 +125,9 @@ class Met:
         self.thin(most)
 
     def thin(self, most: int) -> None:
-        """Keeps at most so many designs: the best of every objective, the compromise, and ever the farthest from those.
+        """Reduce to at most `most` designs: the best of every objective, the compromise, then repeatedly the farthest.
 
-        Designs within `_NEAR` of a kept one are dropped.
+        Designs within `_NEAR` of a kept design are dropped.
         """
         scaled = (self._values - self._low) / self._span
         compromise = int(np.abs(self._points - self.compromise()[0]).max(axis=1).argmin())
@@ -139,13 +139,13 @@ class Met:
         self._points, self._values = self._points[kept], self._values[kept]
 
     def rows(self) -> tuple[np.ndarray, np.ndarray]:
-        """Points and values, ascending in the first objective; equal designs once."""
+        """Points and values without duplicates, ascending in the first objective."""
         _, order = np.unique(self._values, axis=0, return_index=True)
         return self._points[order], self._values[order]
 
 
 class Descent(AbstractScalarization):
-    """Largest change of the objectives from what they are at a point, in spans of the front."""
+    """Scalarization by the largest change of the objectives from their values at a point, in spans of the front."""
 
     part = 0.0
 
@@ -165,16 +165,15 @@ _RTOL = 1e-3  # a search ends where the predicted decrease is below this part of
 class Pareto(Checked):
     """Pareto front by the augmented Chebyshev scalarization (Steuer and Choo 1983), one weight per design.
 
-    Every design minimizes the largest weighted distance from the ideal point, which reaches concave parts of the front
-    too, by sequential linear programming as in `SLP`: all of them advance together. Ideal and nadir follow the
-    designs that have been met. The first round seeks the ends of the front, the best designs of one objective each,
-    from start points all over the box. The others seek the designs of evenly spread weights, each from the best one
-    that has been met for its weight. On a finer mesh the designs of the front go on, each by the weight that leads to
-    it.
+    Every design minimizes the largest weighted distance from the ideal point by sequential linear programming as in
+    `SLP`; this also reaches concave parts of the front. All designs advance together. Ideal and nadir are updated with
+    the designs found. The first round seeks the ends of the front, the best design of each objective, from start points
+    all over the box. Further rounds seek designs for evenly spread weights, each from the best design so far for its
+    weight. The designs of the front are continued on a finer mesh, each with the weight that leads to it.
 
     Attributes:
-        points: designs that are sought, and the most that the front has.
-        steps: most steps of every one in each round.
+        points: number of designs sought, and the largest number of the front.
+        steps: largest number of steps of every design in each round.
     """
 
     name: ClassVar[str] = "pareto"
@@ -182,11 +181,11 @@ class Pareto(Checked):
     steps: int = count(high=100_000, default=20)
 
     def search(self, problem: Problem, record: Record) -> "Met":
-        """Runs the rounds; gives at most `points` designs.
+        """Run all rounds; returns at most `points` designs.
 
         Raises:
             ValueError: for fewer points than objectives.
-            RuntimeError: when no design keeps the constraints.
+            RuntimeError: if no design meets the constraints.
         """
         met, objectives = Met(record), len(problem.objectives)
         if self.points < objectives:
@@ -206,7 +205,8 @@ class Pareto(Checked):
         return met
 
     def end_on(self, mesh: Mesh, met: "Met") -> tuple["Met", bool]:
-        """Goes on from the designs of a front on a finer mesh; whether that is fine enough for all of them."""
+        """Continue the designs of a front on a finer mesh; returns them, and True if the mesh is fine enough for all.
+        """
         record = met.record.on(met.record.problem.on(mesh))
         finer = Met(record, met.frame())
         searches = [Search(point, Chebyshev(met.weight(value), finer.frame)) for point, value in zip(*met.rows())]
@@ -225,21 +225,21 @@ def pareto(
     positions: int | None = POSITIONS,
     callback: Callback | None = None,
 ) -> Front:
-    """Finds the designs of which none is better in all of several objectives.
+    """Find the Pareto front of several objectives: designs that no other design dominates.
 
     Args:
         problem: mesh, loads, design, bounds and two or more objectives.
-        method: how many designs are sought, and in how many steps.
-        positions: of the finer mesh on which the search ends, as for `minimize`.
+        method: number of designs and of steps.
+        positions: number of positions of the finer mesh on which the search ends, as for `minimize`.
         callback: called as callback(step, steps, distance of the compromise from the ideal).
 
     Returns:
-        the front; its values are those on the mesh of the compromise, on which the search ends: limits hold at twice
-        its positions, too.
+        the front, evaluated on the mesh of the compromise, on which the search ends; limits are also met at twice its
+        positions.
 
     Raises:
         ValueError: for fewer than two objectives.
-        RuntimeError: when no design keeps the constraints.
+        RuntimeError: if no design meets the constraints.
     """
     if len(problem.objectives) < 2:
         raise ValueError("objective must be at least two quantities; a single one is for jaxgear.minimize")
@@ -273,7 +273,7 @@ def pareto(
 
 
 def _evidence(record: Record, points, values, span, batch: int) -> np.ndarray:
-    """Fastest decrease of all objectives at once that is left at every point."""
+    """First-order optimality of every point: largest common decrease of all objectives per step, in spans."""
     left, problem = np.empty(len(points)), record.problem
     linearizer = record.linearizer or Linearizer(problem, batch)
     for start in range(0, len(points), batch):
@@ -286,7 +286,7 @@ def _evidence(record: Record, points, values, span, batch: int) -> np.ndarray:
 
 
 def _ends(objectives: int) -> np.ndarray:
-    """Weights of one objective each, with next to nothing for the others."""
+    """Weights of the ends of the front, one objective each, with `END` for the others."""
     return np.where(np.eye(objectives, dtype=bool), 1 - (objectives - 1) * END, END)
 
 

@@ -1,4 +1,4 @@
-"""Searches that follow no gradient: evolution (evosax) and full factorial tables."""
+"""Gradient-free searches: evolution (evosax) and full factorial tables."""
 
 import functools
 from abc import abstractmethod
@@ -28,9 +28,9 @@ class _Evolution(Checked, AbstractSearch):
     """Generations of a population in the unit box; individuals outside it are moved to its surface.
 
     Attributes:
-        population: designs per generation.
-        generations: how many.
-        seed: of the random numbers.
+        population: number of designs per generation.
+        generations: number of generations.
+        seed: seed of the random numbers.
     """
 
     population: int = count(low=_LEAST_POPULATION, high=_MOST, default=100)
@@ -38,7 +38,7 @@ class _Evolution(Checked, AbstractSearch):
     seed: int = count(low=0, high=2**31 - 1, default=0)
 
     def search(self, problem: Problem, record: Record) -> None:
-        """Runs the generations."""
+        """Run all generations and store the best design in the record."""
         with _relaxed():
             algorithm, parameters = _made(replace(self, seed=0), len(problem.names), problem.low.dtype)
         key, first = jax.random.split(jax.random.key(self.seed))
@@ -54,7 +54,7 @@ class _Evolution(Checked, AbstractSearch):
             record.look(generation + self.generations - rest, self.generations)
 
     def _begin(self, algorithm, parameters, problem, record, key):
-        """State before the next generation, and how many generations are left."""
+        """State before the next generation, and number of remaining generations."""
         points = jax.random.uniform(key, (self.population, len(problem.names)), problem.low.dtype)
         ranks = fitness(record.judge(points))
         record.look(1, self.generations)
@@ -63,7 +63,7 @@ class _Evolution(Checked, AbstractSearch):
 
     @abstractmethod
     def _algorithm(self, example):
-        """The algorithm and its parameters, for designs such as the example."""
+        """Algorithm and its parameters for designs of the shape of the example."""
 
 
 class Genetic(_Evolution):
@@ -121,13 +121,13 @@ class CMAES(_Evolution):
 
 @functools.lru_cache(maxsize=16)
 def _made(method: _Evolution, parameters: int, dtype):
-    """Made once: algorithms hash by identity, and a new one would compile all its functions anew."""
+    """Cached algorithm: algorithms hash by identity, and a new one would compile all its functions again."""
     return method._algorithm(jnp.full(parameters, 0.5, dtype))
 
 
 @contextmanager
 def _relaxed():
-    """evosax mixes floating-point types and ranks, which strict promotion would forbid."""
+    """Context with standard type promotion: evosax mixes floating-point types and ranks."""
     with jax.numpy_dtype_promotion("standard"), jax.numpy_rank_promotion("allow"):
         yield
 
@@ -142,14 +142,14 @@ def _evosax():
 
 _LEVELS = 5
 _MOST_DESIGNS = 10**7
-_CHUNK = 2048  # designs between two looks
+_CHUNK = 2048  # designs between two reports
 
 
 class Factorial(AbstractSearch):
     """Every combination of equally spaced levels of every parameter, bounds included.
 
     Attributes:
-        levels: how many per parameter: one number, or one by the name of every parameter.
+        levels: number of levels per parameter: one number, or a number by the name of every parameter.
     """
 
     name: ClassVar[str] = "factorial"
@@ -164,7 +164,7 @@ class Factorial(AbstractSearch):
             whole("Factorial: levels", value, 2)
 
     def search(self, problem: Problem, record: Record) -> None:
-        """Evaluates all."""
+        """Evaluate all combinations and store the best design in the record."""
         levels = self.levels if isinstance(self.levels, int) else dict(self.levels)
         plan = FullFactorial({name: (0.0, 1.0) for name in problem.names}, levels)
         if plan.size > _MOST_DESIGNS:

@@ -40,18 +40,18 @@ Scalar = Float[Array, ""]
 Vector = Float[Array, " parameters"]
 Result = TypeVar("Result")  # a tree of arrays
 
-# Contact analyses that a value with its gradient counts for, and the gradient of every further number of the contact.
+# Cost in contact analyses of a value with its gradient, and of the gradient of every further quantity.
 GRADIENT_COST = 3
 _FURTHER_GRADIENT = 2
 
 
 class Score(NamedTuple):
-    """A design judged.
+    """Objectives and violation of a design.
 
     Attributes:
-        value: the objectives to be made small, shape (objectives,); negative for quantities of which large values are
-            the better ones; inf where a contact solution failed.
-        violation: largest relative excess over a constraint, 0 where all are kept.
+        value: objectives to be minimized, shape (objectives,); the negative value for quantities whose larger values
+            are better; inf if a contact has not converged.
+        violation: largest relative excess over a constraint, 0 if all are met.
     """
 
     value: Float[Array, " objectives"]
@@ -61,11 +61,11 @@ class Score(NamedTuple):
 class Roughness(eqx.Module):
     """Penalty on the largest absolute value of linear forms of the parameters, such as the curvature of a table.
 
-    The method "slp" alone follows it.
+    Only sequential linear programming supports it.
 
     Attributes:
-        forms: coefficients over the unit box, shape (forms, parameters).
-        weight: of the largest absolute value, in units of the objective.
+        forms: coefficients of the linear forms over the unit box, shape (forms, parameters).
+        weight: weight of the largest absolute value, in units of the objective.
     """
 
     forms: Float[Array, "forms parameters"]
@@ -78,23 +78,23 @@ def unmodified(parameters: Parameters) -> Modifications:
 
 
 class Problem(eqx.Module):
-    """Minimize measures of quantities over cases, within a box and constraints; variables live in the unit box.
+    """Optimization problem: minimize measures of quantities over cases within bounds and constraints.
 
-    For an optimizer of your own: `score` is what any method needs, `linearize` what a sequence of linear programs
-    needs, `parameters` and `modifications` say what a point means. All are traceable, so that
-    `jax.vmap(problem.score)` judges many points and `jax.grad` goes through `score`.
+    Points of the problem lie in the unit box. For your own optimizer: `score` evaluates a point, `linearize` serves
+    sequential linear programming, `parameters` and `modifications` convert a point. All are traceable: use
+    `jax.vmap(problem.score)` for many points and `jax.grad` through `score`.
 
     Attributes:
-        design: makes (pinion, wheel) modifications from the named variables.
-        names: of the variables.
-        low, high: their bounds, shape (variables,).
+        design: function that returns (pinion, wheel) modifications from the named variables.
+        names: names of the variables.
+        low, high: bounds of the variables, shape (variables,).
         mesh: prepared mesh.
-        conditions: loads and manufactured gears, with the `cases` that they make on the mesh.
-        objectives: quantities; those of which large values are the better ones are made large.
-        measure: turns the numbers of the cases into one.
-        constraints: limits that hold in every case.
-        settings: that objectives and constraints share, see `metrics.share_settings`.
-        roughness: penalty on the variables, None without.
+        conditions: loads and manufactured gears; with the mesh they give the `cases`.
+        objectives: quantities, minimized, or maximized if larger values are better.
+        measure: measure that reduces the values of the cases to one.
+        constraints: limits in every case.
+        settings: settings shared by objectives and constraints, see `metrics.share_settings`.
+        roughness: penalty on the variables; None for no penalty.
     """
 
     design: Design
@@ -123,25 +123,26 @@ class Problem(eqx.Module):
         manufactured: ManufacturedGears | None = None,
         roughness: Roughness | None = None,
     ) -> None:
-        """Poses the problem.
+        """Set up the problem.
 
         Args:
             mesh: prepared mesh.
-            torque: on the pinion [N m], or a `LoadSpectrum`.
-            design: makes (pinion, wheel) modifications from the named variables; traced, so it must be pure. Nominal
-                involutes for a method that brings its own variables.
-            bounds: (low, high) of every variable, in the unit that `design` expects; none for such a method.
-            objective: a quantity, or several for `pareto`: its name, a `Quantity`, or a function of a cycle. It is made
-                large where large values are the better ones.
-            measure: of the objective over torques and manufactured gears: `Mean()`, `Worst()`, `Quantile(level)` or
-                `CVaR(level)`; None for the mean.
-            constraints: limits that hold in every case.
-            manufactured: manufactured gears, which run under every torque; None for nominal gears.
-            roughness: penalty on the variables; None without.
+            torque: torque on the pinion [N m], or a `LoadSpectrum`.
+            design: function that returns (pinion, wheel) modifications from the named variables; traced, so it must be
+                pure. Nominal involutes for a method with its own variables.
+            bounds: (low, high) of every variable, in the unit that `design` expects; empty for a method with its own
+                variables.
+            objective: a quantity, or several for `pareto`: its name, a `Quantity`, or a function of a mesh cycle. It is
+                maximized if larger values are better.
+            measure: measure of the objective over torques and manufactured gears: `Mean()`, `Worst()`,
+                `Quantile(level)` or `CVaR(level)`; None for the mean.
+            constraints: limits in every case.
+            manufactured: manufactured gears, each analysed under every torque; None for nominal gears.
+            roughness: penalty on the variables; None for no penalty.
 
         Raises:
-            ValueError: for reversed bounds, unknown names of objectives or constrained variables, a variable
-                on which nothing depends, and whatever the cases refuse.
+            ValueError: for reversed bounds, unknown names of objectives or constrained variables, a variable without
+                effect, and for all errors of the cases.
         """
         self.names, *ends = box(bounds) if bounds else ((), (), ())
         several = [objective] if isinstance(objective, str | Quantity) or callable(objective) else list(objective)
@@ -178,18 +179,18 @@ class Problem(eqx.Module):
 
     @property
     def is_made_of_extremes(self) -> bool:
-        """Whether all that is asked for are extremes of what happens at each position by itself."""
+        """True if all objectives and limited quantities are extremes of local values over the positions."""
         limited = [limit.quantity for limit in self.constraints if limit.quantity is not None]
         return all(of.local and of.reduction.factors(of.sign) is not None for of in (*self.objectives, *limited))
 
     @property
     def gradient_cost(self) -> int:
-        """Contact analyses that a linearization in one case counts for."""
+        """Cost of a linearization in one case, in contact analyses."""
         limits = sum(limit.quantity is not None for limit in self.constraints)
         return GRADIENT_COST + _FURTHER_GRADIENT * (len(self.objectives) - 1 + limits)
 
     def parameters(self, x: Vector | np.ndarray) -> dict[str, Scalar]:
-        """Parameters at a point of the unit box."""
+        """Parameters by name at a point of the unit box, in the units of their bounds."""
         if isinstance(x, np.ndarray) and not isinstance(self.low, jax.core.Tracer):  # NumPy has nothing to compile
             low, high = np.asarray(self.low), np.asarray(self.high)
             return dict(zip(self.names, map(real, low + x * (high - low))))
@@ -199,26 +200,26 @@ class Problem(eqx.Module):
         """Modifications at a point of the unit box.
 
         Raises:
-            ValueError: when the design gives anything but two modifications.
+            ValueError: if the design does not return two modifications.
         """
         return two_modifications(call_with("design", self.design, self.parameters(x)))
 
     def score(self, x: Vector) -> Score:
-        """True objectives and violation."""
+        """True objectives and violation at a point of the unit box."""
         return self._scored(self.over_cases(x, self._judged), self._linear_excess(x))
 
     def score_of(self, pinion: AbstractModification | None = None, wheel: AbstractModification | None = None) -> Score:
-        """True objectives and violation of any modifications, judged by the same measure over the same cases.
+        """True objectives and violation of any modifications, with the same measure over the same cases.
 
-        Linear constraints on the free parameters do not apply to them.
+        Linear constraints on the free parameters are ignored.
         """
         found = self.cases.each(lambda *case: self._judged(self._analysis((pinion, wheel), *case)))
         return self._scored(found, jnp.zeros((0,), self.low.dtype))
 
     def status(self, x: Vector) -> Statuses:
-        """Number of `Status` of a point of the unit box over all cases.
+        """Worst `Status` of a point of the unit box over all cases.
 
-        `OUT_OF_VALIDITY` stands where the contact has converged and an objective or a limit is not finite.
+        The status is `OUT_OF_VALIDITY` if the contact has converged but an objective or a limit is not finite.
         """
 
         def of_case(analysis: Analysis):
@@ -246,11 +247,11 @@ class Problem(eqx.Module):
 
         Args:
             x: point of the unit box.
-            width: of the soft extremes, in the unit of the objective.
+            width: width of the soft extremes, in the unit of the objective.
 
         Returns:
-            the objectives with soft extremes, the true ones, the worst excess over every limit, and whether all
-            contact solutions converged.
+            objectives with soft extremes, true objectives, the worst excess over every limit, and True if all contact
+            solutions have converged.
         """
 
         def of_case(analysis: Analysis):
@@ -263,7 +264,7 @@ class Problem(eqx.Module):
         return self._measured(soft), self._measured(true), worst, jnp.all(fine)
 
     def linearize(self, x: Vector) -> Linearization:
-        """The objectives and the constraints with their slopes; extremes stay exact extremes, see `Pieces`."""
+        """Linearize objectives and constraints at a point of the unit box; extremes stay exact, see `Pieces`."""
         limited = [limit.quantity for limit in self.constraints if limit.quantity is not None]
         found, fine = self._slopes(x, tuple(dict.fromkeys((*self.objectives, *limited))))
         objectives = tuple(pieces_of(of, found[of], of.sign) for of in self.objectives)
@@ -280,7 +281,7 @@ class Problem(eqx.Module):
         return Linearization(objectives, tuple(limits), jnp.all(fine) & jnp.all(jnp.isfinite(known)))
 
     def _slopes(self, x: Vector, wanted: tuple[Quantity, ...]) -> tuple[dict[Quantity, Sloped], Array]:
-        """Values and slopes of quantities in every case, and whether the contact solutions converged."""
+        """Values and slopes of quantities in every case, and True if the contact solutions have converged."""
         local = [of for of in wanted if of.local]
         others = [of for of in wanted if not of.local]
 
@@ -308,7 +309,7 @@ class Problem(eqx.Module):
         return Pieces(sign * value[None, None], sign * (factors * (self.high - self.low))[None, None])
 
     def over_cases(self, x: Vector, of_case: Callable[[Analysis], Result]) -> Result:
-        """A function of the analysis of every case, cases leading."""
+        """Values of a function of the analysis in every case, leading axis (cases,)."""
         both = self.modifications(x)
         return self.cases.each(lambda *case: of_case(self._analysis(both, *case)))
 
@@ -337,5 +338,5 @@ def _worst(excess):
 
 
 def real_points(problem: Problem, points: Numbers) -> jax.Array:
-    """Points of the unit box in the type of the problem."""
+    """Points of the unit box in the floating-point type of the problem."""
     return jnp.asarray(points, problem.low.dtype)

@@ -1,4 +1,4 @@
-"""The end of a search, on a mesh so fine that its result does not change any more and keeps the limits."""
+"""End of a search on a mesh so fine that refinement changes neither the result nor the limits that are met."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -20,8 +20,8 @@ POSITIONS = 512
 _BOUND = 0.02  # change of the objective at twice the positions, relative to it, with which a mesh is fine enough
 _LEAST_BOUND = 1e-3  # the same in the unit of the objective
 _MOST = 2048
-# Searches for a design that keeps the limits, where one for a good design has met none: from about it and all over the
-# box; their reach about it, and their steps.
+# Search for a design that meets the limits: number of starts near the best design and over the box, reach of the near
+# starts, and number of steps.
 _NEAR, _FAR, _REACH, _STEPS = 4, 4, 0.1, 30
 _ENOUGH = 0.1  # of the tolerance of a limit: what a step of theirs has to gain
 
@@ -29,14 +29,14 @@ Found = TypeVar("Found")
 
 
 class Refined(NamedTuple):
-    """The end of a search.
+    """Result of the end of a search.
 
     Attributes:
-        record: of the finest mesh, with all that was spent; of the design on the steps.
-        change: of the objective at twice the positions and, of helical gears, with slices without end; NaN where it was
-            not evaluated.
-        unrounded: of the finest mesh before the variables were rounded; the same as `record` without steps, and where
-            no design on them keeps the limits that it keeps.
+        record: record on the finest mesh, after rounding, with all contact analyses spent.
+        change: change of the objective at twice the positions and, for helical gears, extrapolated to infinitely many
+            slices; NaN if not evaluated.
+        unrounded: record on the finest mesh before rounding; the same as `record` without steps, or if rounding would
+            violate limits.
     """
 
     record: Record
@@ -47,15 +47,15 @@ class Refined(NamedTuple):
 def refined(
     record: Record, polish: Polish, positions: int | None, steps: Mapping[str, float] = MappingProxyType({})
 ) -> Refined:
-    """Goes on from the best design of a record on a finer mesh, see `on_finer_meshes`, and ends on the steps.
+    """Continue a search from its best design on finer meshes, see `on_finer_meshes`, and round the variables.
 
-    Where none of the designs met keeps all limits, one that does is sought whatever its objective is.
+    If no design so far meets all limits, a design that meets them is sought, whatever its objective.
 
     Args:
-        record: of the search so far.
-        polish: searches on, from a point.
-        positions: of the first finer mesh; None to stay.
-        steps: of the variables to be rounded, see `rounded`.
+        record: record of the search so far.
+        polish: function that continues the search from a point.
+        positions: number of positions of the first finer mesh; None to stay on the mesh.
+        steps: steps of the variables to be rounded, see `rounded`.
     """
     if positions is None:
         _kept_to_limits(record, polish)
@@ -79,7 +79,7 @@ def refined(
 
 
 def _on_steps(record: Record, steps: Mapping[str, float], polish: Polish) -> Record:
-    """The best design on the steps, or that of the record without steps and where rounding breaks a limit."""
+    """Record of the best rounded design; the given record without steps, or if rounding violates a limit."""
     if not steps:
         return record
     found = rounded(record, steps, polish)
@@ -87,15 +87,15 @@ def _on_steps(record: Record, steps: Mapping[str, float], polish: Polish) -> Rec
 
 
 def on_finer_meshes(mesh: Mesh, positions: int, end_on: Callable[[Mesh], tuple[Found, bool]]) -> Found:
-    """The end of a search on a finer mesh.
+    """End a search on finer meshes.
 
-    The positions are doubled until what is found changes little when they are doubled again, and keeps its limits
-    there, too.
+    The number of positions is doubled until a further doubling changes the result little and violates no limit.
 
     Args:
-        mesh: of the search.
-        positions: of the first finer mesh, at least those of the mesh.
-        end_on: ends the search on a finer mesh; tells what it has found and whether that mesh is fine enough.
+        mesh: mesh of the search.
+        positions: number of positions of the first finer mesh, at least that of `mesh`.
+        end_on: function that ends the search on a finer mesh; it returns the result, and True if the mesh is fine
+            enough.
     """
     whole("positions", positions)
     count = max(positions, mesh.resolution.positions)
@@ -113,23 +113,22 @@ def fine_enough(
     finer_violations: np.ndarray,
     span: float | np.ndarray = 0.0,
 ) -> bool:
-    """Whether no design changes much on a finer mesh, and none passes a limit there that it keeps.
+    """True if no design changes much on a finer mesh, and no design violates a limit there that it met before.
 
     Args:
         values: objectives, shape (designs, objectives).
-        violations: of the designs.
-        finer_values, finer_violations: the same on the finer mesh.
-        span: of the objectives over the designs, which a change is compared with where it is larger than a value.
+        violations: violations of the designs, shape (designs,).
+        finer_values, finer_violations: objectives and violations on the finer mesh.
+        span: span of the objectives over the designs; the reference of a change is the larger one of value and span.
     """
     same = abs(finer_values - values) <= np.maximum(_BOUND * np.maximum(abs(values), span), _LEAST_BOUND)
     return bool(same.all() and ((counted(violations) > 0) | (finer_violations <= FEASIBLE)).all())
 
 
 def at_more_positions(record: Record, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Objectives of designs at twice the positions of a record, shape (designs, objectives), and their violations.
+    """Objectives at twice the positions, shape (designs, objectives), and violations at four times the positions.
 
-    Violations are those at four times the positions: a peak between two positions may lie between those of twice as
-    many as well.
+    Violations need four times the positions, because a peak can also lie between the positions of twice as many.
     """
     problem = record.problem
     record.spend(len(points))
@@ -145,7 +144,7 @@ def at_more_positions(record: Record, points: np.ndarray) -> tuple[np.ndarray, n
 
 
 def _left_by_slices(record: Record) -> float:
-    """Estimate of what slices without end add to the objective of the best design, zero of spur gears."""
+    """Estimated change of the objective of the best design for infinitely many slices; zero for spur gears."""
     fewer, linearizer = fewer_slices(record.problem.mesh), record.linearizer
     if fewer is None:
         return 0.0
@@ -168,7 +167,8 @@ def _kept_to_limits(record: Record, polish: Polish) -> None:
 
 
 def seek_limits(linearizer: Linearizer, ledger: Ledger, point: np.ndarray) -> None:
-    """Searches for designs that keep the limits, by their violation alone, from about a point and all over the box."""
+    """Search for designs that meet the limits, by minimizing the violation from points near `point` and over the box.
+    """
     problem = linearizer.problem
     beside = points_nearby(point, _NEAR - 1, reach=_REACH, seed=0)
     nothing = NoObjective(len(problem.objectives))
@@ -177,7 +177,7 @@ def seek_limits(linearizer: Linearizer, ledger: Ledger, point: np.ndarray) -> No
 
 
 class _Judging:
-    """Tells a record of designs whose models know nothing of the objective."""
+    """Ledger for models without objective: offers designs to a record by their true objectives."""
 
     def __init__(self, record: Record):
         self._record = record
@@ -191,7 +191,7 @@ class _Judging:
         self._record.offer(point, model.values[:1], model.violation)
 
     def look(self, step: int, steps: int) -> None:
-        """Nothing to tell: the objective is not what is made small."""
+        """No report: the search does not minimize the objective."""
 
 
 def _with_positions(mesh: Mesh, positions: int) -> Mesh:

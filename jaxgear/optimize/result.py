@@ -12,7 +12,7 @@ from ..numerics import Checked
 from .problem import Problem
 
 PENALIZED = " with curvature penalty"  # what the name of an objective says of it
-_SHOWN_PARAMETERS = 12  # a table of a hundred flank values tells a reader nothing
+_SHOWN_PARAMETERS = 12  # longer lists, such as table values of flanks, are not printed
 
 
 class Iterate(Checked):
@@ -20,11 +20,11 @@ class Iterate(Checked):
 
     Attributes:
         pinion, wheel: modifications.
-        transmission_error: over the positions [um], shape (positions,).
+        transmission_error: transmission error over the positions [um], shape (positions,).
         ppte: peak-to-peak transmission error [um].
-        limit: its lower limit, the variation while one pair alone carries the load on unmodified flank [um].
+        limit: lower limit of the PPTE, the variation in single contact on unmodified flanks [um].
         max_relief: largest material removed [um].
-        max_flank_pressure, max_corner_pressure: [MPa].
+        max_flank_pressure, max_corner_pressure: largest pressure of flanks and of tip corners [MPa].
     """
 
     pinion: AbstractModification
@@ -38,13 +38,13 @@ class Iterate(Checked):
 
 
 class Limit(Checked):
-    """A constraint at the optimum.
+    """Constraint at the optimum.
 
     Attributes:
-        value: of the constrained number, the worst over the cases.
-        low, high: its limits; None for none.
-        unit: of all three, "" for a pure number.
-        kept: whether it is within its limits, up to the tolerance of constraints.
+        value: constrained value, the worst over the cases.
+        low, high: limits of the value; None for no limit.
+        unit: unit of value and limits; "" for a pure number.
+        kept: True if the value is within its limits, up to the tolerance of constraints.
     """
 
     value: float
@@ -68,13 +68,13 @@ class Limit(Checked):
 
 
 class Rounding(Checked):
-    """How the parameters of an optimum were rounded, and what they were before.
+    """Rounding of the parameters of an optimum.
 
     Attributes:
-        steps: of the rounded parameters, in the units of their bounds; none where no design on the steps was found that
-            keeps the limits.
-        parameters: value of every free parameter before.
-        objective: before, in its unit, on the same mesh.
+        steps: steps of the rounded parameters, in the units of their bounds; empty if no rounded design meets the
+            limits.
+        parameters: values of all free parameters before rounding.
+        objective: objective before rounding, in its unit, on the same mesh.
     """
 
     steps: dict[str, float]
@@ -87,39 +87,41 @@ class Rounding(Checked):
 
 
 class Optimum(eqx.Module):
-    """Result of every method of optimization.
+    """Result of every optimization method.
 
     Attributes:
-        method: its name.
-        objective_name: what was minimized, such as "ppte", "95 % CVaR of ppte" or "ppte with curvature penalty".
-        parameters: value of every free parameter; none where the flanks themselves were sought.
-        pinion, wheel: the modifications.
-        mesh: prepared mesh on which it was evaluated.
-        cycle: mesh cycle of the optimum, of nominal gears under the torque (of a load spectrum, its heaviest weight).
-        ppte: peak-to-peak transmission error of that cycle [um].
-        objective: least value found of what was minimized, in its unit.
-        objective_unit: "" for a pure number.
-        positions: of the mesh on which objective, cycle and constraints were evaluated, per base pitch.
-        grid_change: change of the objective when these are doubled and, of helical gears, slices are without end, in
-            its unit; NaN where it was not evaluated, as with a search that stays on its mesh.
+        method: name of the method.
+        objective_name: name of the objective, such as "ppte", "95 % CVaR of ppte" or "ppte with curvature penalty".
+        parameters: value of every free parameter; empty for methods whose variables are the flanks.
+        pinion, wheel: modifications of the optimum.
+        mesh: prepared mesh of the evaluation.
+        cycle: mesh cycle of the optimum with nominal gears, under the torque (for a load spectrum the torque of the
+            largest weight).
+        ppte: peak-to-peak transmission error of `cycle` [um].
+        objective: value of the objective, in its unit.
+        objective_unit: unit of the objective; "" for a pure number.
+        positions: number of positions per base pitch of `mesh`, on which objective, cycle and constraints were
+            evaluated.
+        grid_change: change of the objective at twice the positions and, for helical gears, extrapolated to infinitely
+            many slices, in its unit; NaN if not evaluated, as for a search that stays on its mesh.
         optimality: first-order optimality: largest predicted decrease of the objective within bounds and constraints,
             per full range of a parameter; 0 at an optimum. It comes from the linearized problem (`linear_model`) and
-            counts the kinks of extremes, where the plain gradient does not vanish. NaN where there are no parameters,
-            and where the slopes are not finite. With `rounding` that of the design before.
-        active_bounds: which parameters ended at their "lower" or "upper" bound.
-        constraints: the limits, by name, each with its value and whether it is kept.
-        violation: largest relative excess over a constraint; 0 where all are kept.
+            includes the kinks of extremes, where the plain gradient does not vanish. NaN without parameters, and for
+            slopes that are not finite. With `rounding` it is the value before rounding.
+        active_bounds: "lower" or "upper" for every parameter that ended at a bound, by name.
+        constraints: constraints by name, each with its value and limits.
+        violation: largest relative excess over a constraint; 0 if all are met.
         evaluations: contact analyses spent, one per design, torque and manufactured gear; one with its gradient
             counts as three, each further gradient as two.
         history: best objective after every report of the search, on its mesh at that time.
-        history_evaluations: contact analyses spent until then.
-        history_positions: positions of that mesh; None where they are `positions` all the way.
+        history_evaluations: contact analyses spent until every report.
+        history_positions: number of positions of the mesh at every report; None if it is always `positions`.
         seconds: wall time of the search, compilation included [s].
-        iterations: states of the transmission-error iteration, the first one before any change; empty for other
+        iterations: states of the transmission-error iteration, starting with the initial flanks; empty for other
             methods.
-        problem: the optimization problem, on `mesh`, by which `judged` evaluates other designs; None of the
+        problem: optimization problem on `mesh`, with which `judged` evaluates other designs; None for the
             transmission-error iteration.
-        rounding: steps of the parameters, and what they were before; None where they keep all digits.
+        rounding: steps of the parameters, and their values before rounding; None without rounding.
     """
 
     method: str = eqx.field(static=True)
@@ -149,7 +151,7 @@ class Optimum(eqx.Module):
 
     @property
     def feasible(self) -> bool:
-        """Whether every constraint is kept."""
+        """True if all constraints are met."""
         return self.violation == 0.0
 
     def __str__(self) -> str:
@@ -182,7 +184,7 @@ class Optimum(eqx.Module):
             yield "NOT FEASIBLE", f"a limit is passed by {100 * self.violation:.2g} %"
 
     def summary(self) -> dict[str, Any]:
-        """Plain numbers, for a table or a file."""
+        """Values of the optimum as plain data, for a table or a file."""
         return {
             "method": self.method,
             "objective_name": self.objective_name,
@@ -202,19 +204,19 @@ class Optimum(eqx.Module):
 
 
 class Front(Checked):
-    """Designs of which none is better in every objective.
+    """Pareto front: designs that no other design dominates.
 
     Attributes:
-        objectives: their names.
-        units: their units.
-        values: shape (designs, objectives), sorted by the first objective.
-        parameters: value of every free parameter, each of shape (designs,).
-        optimality: first-order evidence of every design, shape (designs,): the fastest decrease of all objectives at
-            once that is left within bounds and constraints, in spans of the front per step of the full range of every
-            parameter. It is 0 where no direction improves all of them.
-        compromise: the design whose worst distance from the ideal point, in spans of the front, is about the least; its
-            objective is that distance.
-        chosen: its row.
+        objectives: names of the objectives.
+        units: units of the objectives.
+        values: objectives of the designs, shape (designs, objectives), sorted by the first objective.
+        parameters: values of every free parameter, shape (designs,) each.
+        optimality: first-order optimality of every design, shape (designs,): largest predicted common decrease of all
+            objectives within bounds and constraints, in spans of the front per full range of every parameter; 0 if no
+            direction improves all objectives.
+        compromise: design with about the least largest distance from the ideal point, in spans of the front; its
+            objective is this distance.
+        chosen: row of the compromise.
     """
 
     objectives: tuple[str, ...] = eqx.field(static=True)

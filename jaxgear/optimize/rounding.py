@@ -1,4 +1,4 @@
-"""The best design in steps that a shop can make, about the optimum of a search."""
+"""Rounding of an optimum to steps that can be manufactured."""
 
 from collections.abc import Callable, Iterable, Mapping
 from itertools import combinations, product
@@ -22,10 +22,10 @@ Cell = tuple[int, ...]  # of the grid: a multiple of every step
 
 
 def check_steps(steps: Mapping[str, float], bounds: Mapping[str, tuple[float, float]]) -> dict[str, float]:
-    """Steps of the rounded variables, without those of 0.
+    """Checked steps of the rounded variables, without steps of 0.
 
     Raises:
-        ValueError: for a name that is no variable, a negative step, and one without a multiple within the bounds.
+        ValueError: for an unknown variable, a negative step, and a step without a multiple within the bounds.
     """
     for name, step in steps.items():
         if name not in bounds:
@@ -41,26 +41,26 @@ def check_steps(steps: Mapping[str, float], bounds: Mapping[str, tuple[float, fl
 
 
 def multiples(step: float, low: float, high: float) -> range:
-    """The whole numbers whose product with a step lies within bounds."""
+    """Range of whole numbers whose product with a step lies within bounds."""
     return range(int(np.ceil(low / step - _SLACK)), int(np.floor(high / step + _SLACK)) + 1)
 
 
 def on_step(value: float, step: float) -> float:
-    """The multiple of a step that is nearest to a number."""
+    """Multiple of a step nearest to a value."""
     return round(round(value / step) * step, _DIGITS)
 
 
 def rounded(record: Record, steps: Mapping[str, float], polish: Polish) -> Record:
-    """The best design on the steps about the best design of a record, judged as the search judges.
+    """Record of the best rounded design near the best design of a record, by the objective and limits of the search.
 
-    All grid points around the optimum are evaluated, of many variables the nearest one alone; from the best of them the
-    search goes on to the best neighbour, one or two variables by one step, as long as that gains. The variables without
-    a step are searched again after every move, the others fixed.
+    All grid points around the optimum are evaluated; with many variables only the nearest one. From the best of them
+    the search moves to the best neighbour, by one step of one or two variables, as long as the objective improves.
+    After every move the variables without a step are optimized again.
 
     Args:
-        record: of the search, at its end.
-        steps: of the rounded variables, as `check_steps` gives them.
-        polish: searches on from a point.
+        record: record at the end of a search.
+        steps: steps of the rounded variables from `check_steps`.
+        polish: function that continues a search from a point.
     """
     found, grid = Record(record.problem, None), _Grid(record.problem, steps)
     found.evaluations, found.history, found.linearizer = record.evaluations, record.history, record.linearizer
@@ -85,7 +85,7 @@ def rounded(record: Record, steps: Mapping[str, float], polish: Polish) -> Recor
 
 
 class _Grid:
-    """Multiples of the steps within the bounds, in the unit box."""
+    """Grid of the multiples of the steps within the bounds, in the unit box."""
 
     def __init__(self, problem: Problem, steps: Mapping[str, float]) -> None:
         low, high = np.asarray(problem.low, float), np.asarray(problem.high, float)
@@ -99,23 +99,23 @@ class _Grid:
         return np.asarray([on_step(number * step, step) for number, step in zip(cell, self._step)])
 
     def point(self, cell: Cell, beside: np.ndarray) -> np.ndarray:
-        """A grid point, its other variables as those of a point."""
+        """Point of the unit box with rounded variables from a grid cell and the others from the point `beside`."""
         point = np.array(beside, float)
         point[self.columns] = np.clip((self.values(cell) - self._low) / self._range, 0.0, 1.0)
         return point
 
     def around(self, point: np.ndarray) -> Iterable[Cell]:
-        """The grid points around a point, or the nearest where there are many."""
+        """Grid points around a point; only the nearest one if there are many."""
         place = self._place(point)
         sides = [sorted({self._inside(i, int(side(at))) for side in (np.floor, np.ceil)}) for i, at in enumerate(place)]
         return product(*sides) if np.prod([len(side) for side in sides]) <= _CORNERS else [self.cell(point)]
 
     def cell(self, point: np.ndarray) -> Cell:
-        """The nearest grid point."""
+        """Grid point nearest to a point."""
         return tuple(self._inside(i, round(at)) for i, at in enumerate(self._place(point)))
 
     def neighbours(self, point: np.ndarray) -> Iterable[Cell]:
-        """The grid points that differ in one variable by a step, and in two of not too many."""
+        """Grid points that differ by a step in one variable, or in two if the variables are few."""
         cell, count = np.asarray(self.cell(point)), len(self.columns)
         together = (1, 2) if count <= _PAIRS else (1,)
         for moved in (each for size in together for each in combinations(range(count), size)):
@@ -134,7 +134,7 @@ class _Grid:
 
 
 def _judge(record: Record, points: np.ndarray) -> None:
-    """Offers designs, by the program that the search has compiled."""
+    """Evaluate designs with the compiled program of the search and offer them to the record."""
     if record.linearizer is None:
         record.judge(points, _AT_ONCE)
         return
@@ -146,7 +146,7 @@ def _judge(record: Record, points: np.ndarray) -> None:
 
 
 def _search_free(record: Record, grid: _Grid, polish: Polish) -> None:
-    """Searches on in the variables without a step."""
+    """Continue the search in the variables without a step."""
     problem = record.problem
     if len(grid.columns) == len(problem.names):
         return

@@ -14,9 +14,9 @@ from .problem import Problem, Score, real_points
 
 
 class Record:
-    """Best design so far, contact analyses spent, and the callback that is told.
+    """Record of a search: best design so far, contact analyses spent, and progress callback.
 
-    A design that keeps the constraints beats one that does not; among those that do not, the least violation wins.
+    A design that meets the constraints is better than one that does not; otherwise the smaller violation is better.
     """
 
     def __init__(self, problem: Problem, callback: Callback | None) -> None:
@@ -24,20 +24,20 @@ class Record:
         self.evaluations = 0
         self.point = np.full(len(problem.names), 0.5)
         self.value, self.violation = float("inf"), float("inf")
-        self.model: LinearModel | None = None  # linearization at the best design, where the method made one
-        self.linearizer: Linearizer | None = None  # which made it
+        self.model: LinearModel | None = None  # linearization at the best design; None if the method makes none
+        self.linearizer: Linearizer | None = None  # linearizer of `model`
         self.history: list[tuple[int, float, int]] = []  # analyses, value, and positions of the mesh that it is of
         self._callback = callback
 
     def on(self, problem: Problem) -> "Record":
-        """A record of the same problem on another mesh, with what was spent and the history of this one."""
+        """New record of the problem on another mesh, with the spent analyses and the history of this record."""
         other = Record(problem, None)
         other.evaluations, other.history = self.evaluations, self.history
         other.linearizer = None if self.linearizer is None else self.linearizer.on(problem)
         return other
 
     def check(self) -> None:
-        """Raises a `RuntimeError` with the commonest reason when nothing was found."""
+        """Raise a `RuntimeError` with the most frequent reason if no design was found."""
         if np.isfinite(self.value):
             return
         status = statuses(self.problem, start_points(self.problem, _ASKED))
@@ -47,13 +47,13 @@ class Record:
         raise RuntimeError("; ".join(filter(None, (problem, why))))
 
     def spend(self, designs: int, *, analyses: int = 1) -> None:
-        """Counts contact analyses: of so many designs in every case, each worth so many."""
+        """Count contact analyses of a number of designs in every case, `analyses` each."""
         self.evaluations += designs * analyses * self.problem.cases.count
 
     def offer(
         self, points: np.ndarray | Array, values: Given, violations: Given, model: LinearModel | None = None
     ) -> None:
-        """Designs with their true objective and violation; anything that is not finite is no candidate."""
+        """Compare designs, by true objective and violation, with the best design; values that are not finite lose."""
         many, value, violation = np.atleast_2d(points), np.ravel(values), np.ravel(violations)
         good = np.isfinite(value) & np.isfinite(violation)
         if not good.any():
@@ -65,11 +65,11 @@ class Record:
             self.model = model
 
     def judge(self, points: np.ndarray | Array, chunk: int = 1) -> Score:
-        """True scores of points of the unit box, which are counted and offered.
+        """Evaluate points of the unit box, count the analyses and offer the designs.
 
         Args:
-            points: shape (points, parameters).
-            chunk: of so many or a multiple of it the program is compiled, where calls differ in their number.
+            points: points of the unit box, shape (points, parameters).
+            chunk: the number of points is padded to a multiple of this number, to avoid compilations.
         """
         found = scores(self.problem, padded(points, chunk))
         score = jax.tree.map(lambda part: np.asarray(part)[: len(points)], found)
@@ -78,38 +78,38 @@ class Record:
         return score
 
     def take(self, point: np.ndarray | Array, model: LinearModel) -> None:
-        """A design with its linearization."""
+        """Offer a design with its linear model."""
         self.offer(point, model.value, model.violation, model)
 
     def look(self, step: int, steps: int) -> None:
-        """Marks the progress: after `step` of `steps`."""
+        """Report the progress after `step` of `steps`."""
         self.report(step, steps, self.value)
 
     def report(self, step: int, steps: int, value: float) -> None:
-        """Marks the progress of a method that keeps its own best design."""
+        """Report the progress of a method with its own best objective."""
         self.history.append((self.evaluations, value, self.problem.mesh.resolution.positions))
         if self._callback is not None:
             self._callback(step, steps, value)
 
 
 def start_points(problem: Problem, count: int) -> np.ndarray:
-    """The middle of the box, then a Halton sequence: deterministic, so that a design file always gives one answer."""
+    """Start points in the unit box: the middle, then a Halton sequence; deterministic, shape (count, parameters)."""
     points = halton(len(problem.names), count)
     points[0] = 0.5
     return points.astype(np.dtype(problem.low.dtype))
 
 
 def points_nearby(point: np.ndarray, count: int, *, reach: float, seed: int) -> np.ndarray:
-    """A Halton sequence in the cube of so much reach about a point of the unit box, moved inside where it sticks out.
+    """Halton points in a cube of half width `reach` around a point, moved into the unit box, shape (count, parameters).
 
-    Every seed gives other points, always the same.
+    Every seed gives different, reproducible points.
     """
     corner = np.clip(point - reach, 0.0, 1.0 - 2 * reach)
     return corner + 2 * reach * halton(len(point), count, seed)
 
 
-_ASKED = 16  # designs by which the reason of a failed search is told
-_INFEASIBLE = 1e6  # rank of a design that passes a limit, above any objective
+_ASKED = 16  # number of designs from which the reason of a failed search is determined
+_INFEASIBLE = 1e6  # rank of a design that violates a limit, above any objective
 
 
 def scores(problem: Problem, points: np.ndarray | Array) -> Score:
@@ -125,7 +125,7 @@ def _scores(problem: Problem, points, batch: int) -> Score:
 
 
 def statuses(problem: Problem, points: np.ndarray | Array) -> np.ndarray:
-    """Numbers of `Status` of points of the unit box over all cases, shape (points,)."""
+    """Worst `Status` of points of the unit box over all cases, shape (points,)."""
     count = len(points)
     batch = min(side_by_side(problem.mesh, problem.cases.count), count)
     return np.asarray(_statuses(problem, real_points(problem, padded(points, batch)), batch))[:count]
@@ -137,7 +137,7 @@ def _statuses(problem: Problem, points, batch: int):
 
 
 def fitness(score: Score) -> Float[Array, " designs"] | Float[Array, ""]:
-    """One number to rank by: the objective, and far above any of them the violation."""
+    """Rank of designs: the objective; for designs that violate limits a number far above, rising with the violation."""
     value, excess = score.value[..., 0], counted(score.violation)
     rank = jnp.where(excess > 0, _INFEASIBLE * (1 + excess), value)
     return jnp.where(jnp.isfinite(value), rank, jnp.inf)

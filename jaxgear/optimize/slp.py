@@ -18,21 +18,21 @@ class Ledger(Protocol):
     """Interface to the record of a search, such as `Record`."""
 
     def spend(self, designs: int, *, analyses: int) -> None:
-        """Counts contact analyses."""
+        """Count contact analyses."""
 
     def take(self, point: np.ndarray, model: LinearModel) -> None:
-        """Takes a design with its linearization."""
+        """Take a design with its linear model."""
 
     def look(self, step: int, steps: int) -> None:
-        """Marks the progress before a step."""
+        """Report the progress before a step."""
 
 
 class Search:
-    """One search: where it is, and how far it trusts its model.
+    """State of one search: its point, linear model and trust radius.
 
     Args:
-        point: of the unit box, where it starts.
-        scalarization: of several objectives.
+        point: start point in the unit box, shape (parameters,).
+        scalarization: scalarization of several objectives; None for a single one.
     """
 
     def __init__(self, point: np.ndarray, scalarization: AbstractScalarization | None = None) -> None:
@@ -40,7 +40,7 @@ class Search:
         self._point = point
         self._model: LinearModel | None = None
         self._radius, self._predicted = _FIRST_RADIUS, 0.0
-        self._ended: float | None = None  # at this tolerance, where it stands: its program need not be solved again
+        self._ended: float | None = None  # tolerance at which the search has ended
 
     @property
     def penalty(self) -> float | None:
@@ -48,7 +48,7 @@ class Search:
         return None if self._model is None else self._model.penalty
 
     def propose(self, rtol: float) -> bool:
-        """Finds the next trial point; False when the search has ended."""
+        """Find the next trial point; False if the search has ended."""
         if self._model is None or self._radius < _LEAST_RADIUS or self._ended == rtol:
             return False
         step, self._predicted = self._model.best_step(self._radius)
@@ -59,7 +59,7 @@ class Search:
         return moves
 
     def take(self, model: LinearModel) -> None:
-        """Goes to the trial point if it is as good as its model says, and adapts the radius."""
+        """Accept or reject the trial point by actual over predicted decrease, and adapt the trust radius."""
         if self._model is None:
             self._model = model if model.fine else None
             return
@@ -82,7 +82,7 @@ def follow(
     rtol: float,
     round_of: tuple[int, int] = (0, 1),
 ) -> None:
-    """Advances searches until none finds a better step; `round_of` tells the progress which round of how many it is."""
+    """Advance searches until none finds a better step; `round_of` is (index, number) of the round, for the progress."""
     done, rounds = round_of
     _linearize(linearizer, ledger, searches)
     for step in range(steps):
@@ -95,7 +95,7 @@ def follow(
 
 
 def _linearize(linearizer: Linearizer, ledger: Ledger, searches: Sequence[Search]) -> None:
-    """Linearizes at the points that the searches propose."""
+    """Linearize at the points that the searches propose."""
     problem = linearizer.problem
     ledger.spend(len(searches), analyses=problem.gradient_cost)
     for search, found in zip(searches, linearizer(np.stack([search.trial for search in searches]))):

@@ -26,7 +26,7 @@ from .rounding import on_step
 from .search import Record
 
 _AT_BOUND = 1e-6  # a parameter this close to a bound, relative to its range, is at the bound
-PROBE = 1e-3  # step over which the decrease that is left is measured, relative to the ranges
+PROBE = 1e-3  # step for the first-order optimality, relative to the ranges
 
 
 def optimum_of(
@@ -39,16 +39,16 @@ def optimum_of(
     unrounded: Record | None = None,
     steps: Mapping[str, float] = MappingProxyType({}),
 ) -> Optimum:
-    """The best design of a record with all that is said about it.
+    """Optimum from the best design of a record.
 
     Args:
-        record: of the search.
-        method: its name.
-        began: when the search began, as `time.perf_counter` tells.
-        grid_change: of the objective at twice the positions.
-        left: decrease that is left, where it is known.
-        unrounded: record of the search before its variables were rounded; None where they were not to be.
-        steps: to which they were rounded.
+        record: record of the search.
+        method: name of the method.
+        began: start time of the search by `time.perf_counter` [s].
+        grid_change: change of the objective at twice the positions, in its unit.
+        left: first-order optimality; None to compute it.
+        unrounded: record of the search before rounding; None without rounding.
+        steps: steps of the rounded variables.
     """
     problem = record.problem
     x = np.asarray(record.point, np.dtype(problem.low.dtype))
@@ -80,7 +80,7 @@ def optimum_of(
         optimality=left,
         active_bounds=_active_bounds(problem.names, record.point),
         constraints=_limits(problem, x, pinion, wheel),
-        violation=max(record.violation - FEASIBLE, 0.0),  # as an excess is counted from inside a limit
+        violation=max(record.violation - FEASIBLE, 0.0),  # excess is counted from the safety margin inside the limit
         evaluations=record.evaluations,
         history=sign * np.asarray([value for _, value, _ in record.history]),
         history_evaluations=np.asarray([spent for spent, _, _ in record.history]),
@@ -92,13 +92,13 @@ def optimum_of(
 
 
 def _on_steps(parameters: dict[str, Array], steps: Mapping[str, float]) -> dict[str, Array]:
-    """Parameters of which those with a step are the decimal number nearest to its multiple."""
+    """Parameters, rounded to the decimal number of the nearest multiple where a step is given."""
     rounded = {name: on_step(float(parameters[name]), step) for name, step in steps.items()}
     return parameters | {name: real(np.asarray(value, parameters[name].dtype)) for name, value in rounded.items()}
 
 
 def _optimality(record: Record) -> float:
-    """Fastest decrease of the objective at the best point, per step of the full range of every parameter."""
+    """First-order optimality at the best point: largest predicted decrease per full range of every parameter."""
     model = record.model
     if model is None:
         problem = record.problem
@@ -109,7 +109,7 @@ def _optimality(record: Record) -> float:
 
 
 def objective_name(problem: Problem) -> str:
-    """Name of the minimized number."""
+    """Name of the minimized objective, with measure and penalty."""
     names = [of.name for of in problem.objectives]
     if len(names) > 1:
         return f"distance from the ideal of {' and '.join(names)}"
@@ -121,7 +121,8 @@ def judged(
 ) -> dict[str, float]:
     """Objectives of a problem for any modifications, by name and unit as "95 % CVaR of ppte [um]".
 
-    Joined by the measure over the cases; infinite where a contact solution failed. No penalty is added.
+    The measure of the problem is applied over its cases; the value is infinite if a contact has not converged. No
+    penalty is added.
     """
     if _is_single(problem):
         cycle, mesh = _single(problem, problem.objectives, pinion, wheel)
@@ -133,23 +134,23 @@ def judged(
 
 
 def _is_single(problem: Problem) -> bool:
-    """Whether the program that solves one case serves every modification."""
+    """True for a problem with a single case of nominal gears, whose program serves every modification."""
     return problem.cases.count == 1 and problem.cases.removed is None
 
 
 def _single(problem: Problem, quantities, pinion, wheel) -> tuple[MeshCycle, Mesh | None]:
-    """The solution of the only case, and the mesh if any of the quantities asks for it."""
+    """Solution of the single case, and the mesh if a quantity needs it."""
     cases, mesh = problem.cases, problem.mesh
     speed = None if cases.speed is None else np.asarray(cases.speed)[0]
     point = OperatingPoint(np.asarray(cases.torque)[0], speed, cases.friction)
     cycle = solve_case(mesh, point, pinion, wheel)
-    if all(of.local for of in quantities):  # they know nothing of the flanks but what is removed
+    if all(of.local for of in quantities):  # local quantities depend on the flanks only by the material removed
         return replace(cycle, pinion=None, wheel=None), None
     return cycle, mesh
 
 
 def over_cases(problem: Problem) -> str:
-    """The measure of a problem before the name of what it measures, "95 % CVaR of "; "" where it has a single case."""
+    """Measure of a problem as a prefix of the name of a quantity, "95 % CVaR of "; "" for a single case."""
     return f"{in_words(problem.measure)} " if problem.cases.count > 1 else ""
 
 
@@ -184,7 +185,7 @@ def _excess(constraint: Constraint, value) -> float:
 
 
 def _constrained(problem: Problem, x, pinion, wheel) -> Sequence[np.ndarray]:
-    """Values of every constraint, cases leading."""
+    """Values of every constraint, leading axis (cases,)."""
     parameters = problem.parameters(x)
     wanted = tuple(limit.quantity for limit in problem.constraints if limit.quantity is not None)
     of_cycle = iter(_numbers(problem, wanted, x, pinion, wheel) if wanted else ())
@@ -222,12 +223,12 @@ def _active_bounds(names, x) -> dict[str, str]:
 
 
 class Verified(eqx.Module):
-    """PPTE and objectives of a design by one structure model and by finite elements, all else being equal.
+    """PPTE and objectives of a design by the structure model of the mesh and by finite elements.
 
     Attributes:
         claimed: PPTE by the structure of the mesh [um].
-        ppte: PPTE by the finite-element structure [um]; infinite where a contact solution failed.
-        claimed_objectives: objectives of the search, by name and unit; empty where a curve was levelled.
+        ppte: PPTE by the finite-element structure [um]; infinite if a contact has not converged.
+        claimed_objectives: objectives of the search, by name and unit; empty for the transmission-error iteration.
         objectives: objectives by the finite-element structure, by the same measure over the same cases.
         cycle: mesh cycle by the finite-element structure.
     """
@@ -247,20 +248,20 @@ class Verified(eqx.Module):
 
 @dataclass(frozen=True)
 class Verification:
-    """Evaluates designs of a mesh with the finite-element structure in place of its own; `verification` makes one."""
+    """Evaluate designs of a mesh with the finite-element structure in place of its own; made by `verification`."""
 
     _mesh: Mesh
-    _problem: Problem | None  # on that mesh
+    _problem: Problem | None  # on the mesh with the finite-element structure
 
     def __call__(
         self, cycle: MeshCycle, objectives: dict[str, float], pinion: AbstractModification, wheel: AbstractModification
     ) -> Verified:
-        """Both numbers of a design.
+        """Evaluate a design with the finite-element structure.
 
         Args:
-            cycle: of the design on the mesh; its operating point is that of the PPTE.
-            objectives: as `judged` by the problem on the mesh.
-            pinion, wheel: its modifications.
+            cycle: mesh cycle of the design on the original mesh; the PPTE is compared at its operating point.
+            objectives: objectives on the original mesh, from `judged`.
+            pinion, wheel: modifications of the design.
         """
         found = solve_case(self._mesh, cycle.operating_point, pinion, wheel)
         others = {} if self._problem is None else judged(self._problem, pinion, wheel)
@@ -271,9 +272,9 @@ def verification(mesh: Mesh, compliance: TabulatedCompliance, problem: Problem |
     """Verification of designs of a mesh with finite-element tables of its gears.
 
     Args:
-        mesh: prepared mesh, by whose structure the numbers are claimed.
-        compliance: tables of its gears, see `structure_for`.
-        problem: whose objectives are compared besides the PPTE.
+        mesh: prepared mesh with the structure model to be verified.
+        compliance: finite-element tables of its gears, see `structure_for`.
+        problem: problem whose objectives are compared in addition to the PPTE; None for PPTE alone.
     """
     other = prepare(mesh.pair, compliance=compliance, resolution=mesh.resolution, support=mesh.support)
     other = replace(other, automatic=mesh.automatic)
@@ -281,15 +282,14 @@ def verification(mesh: Mesh, compliance: TabulatedCompliance, problem: Problem |
 
 
 def structure_for(mesh: Mesh, *, cache: str | Path | bool | None = True) -> TabulatedCompliance:
-    """Finite-element tables for the gears and the plane of a mesh, which take seconds where they are not on the disk.
+    """Finite-element tables for the gears and the plane state of a mesh; takes seconds unless they are cached.
 
     Args:
         mesh: prepared mesh of concrete gears.
-        cache: as in `finite_element_compliance`.
+        cache: as for `finite_element_compliance`.
 
     Raises:
-        ValueError: for a mesh whose structure is a table already, gears that are traced, and a shape that cannot be
-            meshed.
+        ValueError: for a mesh whose structure is a table already, traced gears, and a shape that cannot be meshed.
     """
     if isinstance(mesh.compliance, TabulatedCompliance):
         raise ValueError("mesh has the finite-element structure already, there is nothing to compare it with")
@@ -297,12 +297,12 @@ def structure_for(mesh: Mesh, *, cache: str | Path | bool | None = True) -> Tabu
 
 
 def begin_verification(mesh: Mesh, compliance: TabulatedCompliance, positions: int | None = None) -> None:
-    """Starts to compile what `verification` needs, where programs are kept, while a search goes on.
+    """Start to compile the programs of `verification` in the background of a search, if programs are cached.
 
     Args:
-        mesh: prepared mesh on which the search begins.
-        compliance: tables of its gears.
-        positions: of the mesh on which it ends; None for those of the mesh.
+        mesh: prepared mesh at the start of the search.
+        compliance: finite-element tables of its gears.
+        positions: number of positions of the mesh at the end of the search; None for that of `mesh`.
     """
     count = mesh.resolution.positions if positions is None else positions
     sizes = replace(mesh.resolution, positions=count)
@@ -310,17 +310,17 @@ def begin_verification(mesh: Mesh, compliance: TabulatedCompliance, positions: i
 
 
 def verify(optimum: Optimum, *, cache: str | Path | bool | None = True) -> Verified:
-    """Evaluates an optimum again with the finite-element structure on the same mesh, in the same cases.
+    """Evaluate an optimum again with the finite-element structure, on the same mesh and in the same cases.
 
-    A search finds the best design of its model: what it claims below the accuracy of the model is not there. It takes
-    seconds for the tables of the gears when they are new, and then milliseconds.
+    A search finds the best design of its model: improvements below the accuracy of the model may not be real. New
+    tables of the gears take seconds, cached ones milliseconds.
 
     Args:
-        optimum: of any method; of a front, its compromise.
-        cache: as in `finite_element_compliance`.
+        optimum: optimum of any method, or the compromise of a front.
+        cache: as for `finite_element_compliance`.
 
     Raises:
-        ValueError: as `structure_for`.
+        ValueError: errors of `structure_for`.
     """
     flanks = optimum.pinion, optimum.wheel
     second = verification(optimum.mesh, structure_for(optimum.mesh, cache=cache), optimum.problem)
