@@ -1,4 +1,4 @@
-"""The dimensionless model of a gear pair: polynomial clearance, multiple scales, dynamic profile modification.
+"""Dimensionless model of a gear pair: polynomial clearance, multiple scales, dynamic profile modification.
 
 from_mesh (a pair's numbers) -> DimensionlessModel -> Oscillator, for every tool of `jaxgear.dynamics`
                                                   -> LoadedMean -> resonances in closed form

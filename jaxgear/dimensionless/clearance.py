@@ -21,16 +21,16 @@ PUBLISHED = {
 }
 _NODES = 64  # Gauss-Legendre on either part of the dead zone: exact for every order here
 _BISECTIONS = 60
-# Below three quarters of the true slope, 1, the loaded gears are no longer those of the dead zone.
+# Below three quarters of the true slope, 1, the fit no longer represents the dead zone.
 _SOFT = 0.75
 
 
 class PolynomialClearance(AbstractMeshForce):
     """f(x) = a_1 x + a_3 x^3 + ... in place of a dead zone of half width 1 and slope 1 beyond it; dimensionless.
 
-    It holds for |x| <= range only; beyond, the polynomial goes wherever its last power takes it (7th order, fitted over
-    |x| <= 3: 8.0 instead of 3 at x = 4). A number out of range is therefore refused, and inside compiled code the force
-    is NaN there: an orbit that has left the range once holds NaN from there on, and counts as not settled.
+    It is valid only for |x| <= range; beyond the range the highest power dominates (7th order, fitted over |x| <= 3:
+    8.0 instead of 3 at x = 4). A concrete x out of range raises an error; in compiled code the force is NaN there: an
+    orbit that leaves the range stays NaN and has not converged.
 
     Attributes:
         coefficients: a_1, a_3, ... of the odd powers, shape (terms,).
@@ -58,7 +58,7 @@ class PolynomialClearance(AbstractMeshForce):
 
     @classmethod
     def published(cls, order: int = 7) -> "PolynomialClearance":
-        """With the coefficients `PUBLISHED` for |x| <= 3."""
+        """Clearance with the published coefficients `PUBLISHED` for |x| <= 3."""
         if order not in PUBLISHED:
             raise ValueError(f"PolynomialClearance.published: order = {order!r} must be 3, 5 or 7")
         return cls(real(PUBLISHED[order]), real(3.0))
@@ -75,23 +75,23 @@ class PolynomialClearance(AbstractMeshForce):
         return jnp.where(inside, self.polynomial(x), jnp.nan)
 
     def polynomial(self, x: Scalar) -> Scalar:
-        """f(x) without regard to the range."""
+        """Polynomial f(x), not checked for the range."""
         value = jnp.zeros_like(x)
         for coefficient in self.coefficients[::-1]:
             value = value * x * x + coefficient
         return value * x
 
     def slope(self, x: Scalar) -> Scalar:
-        """f'(x) without regard to the range."""
+        """Slope f'(x), not checked for the range."""
         return jax.jvp(self.polynomial, (x,), (jnp.ones_like(x),))[1]
 
     def loaded(self, load: Given) -> Scalar:
-        """Largest x in range with f(x) = load: the mean of a loaded mesh; the range itself where the load is beyond."""
+        """Largest x in the range with f(x) = load, the mean of a loaded mesh; the range for a load beyond f(range)."""
         return _loaded(self, real(load))
 
     @property
     def false_zero(self) -> Scalar:
-        """x > 0 with f(x) = 0, where the gears of a fit with a_1 < 0 stand without load; 0 where there is none."""
+        """Positive zero of f for a fit with a_1 < 0, the false equilibrium without load; 0 if it does not exist."""
         return jnp.where(self.coefficients[0] < 0, self.loaded(0.0), 0.0)
 
 
@@ -113,13 +113,13 @@ def _loaded(clearance: PolynomialClearance, load: Scalar) -> Scalar:
 
 
 def warn_of_false_well(clearance: PolynomialClearance, load: Given) -> bool:
-    """Warns where a load is too small for a fit with a_1 < 0, which makes a double well of the clearance.
+    """Warn if a load is too small for a fit with a_1 < 0, whose clearance has a false double well.
 
-    A dead zone carries every load with slope 1; such a fit is softer than three quarters of that where the load stands
-    in the well or on its edge, and its resonances mean nothing.
+    A dead zone has slope 1 under every load. A fit with a slope below three quarters at the load is in the well or near
+    its edge, and its resonances are meaningless.
 
     Returns:
-        whether it warned; False for traced numbers.
+        True if a warning was given; False for traced numbers.
     """
     first, carried, most = concrete(clearance.coefficients), concrete(real(load)), concrete(clearance.range)
     if first is None or carried is None or most is None or not first[0] < 0:

@@ -17,14 +17,14 @@ _MICRO = 1e-6  # kg um/s^2 are 1e-6 N
 
 
 class Identified(Checked):
-    """A gear pair's dimensionless model and what turns its numbers into a pair's.
+    """Dimensionless model of a gear pair, and the scales between both.
 
     Attributes:
         model: x = 1 + (transmission error - mean unloaded one) / b on the drive flanks.
         half_clearance: b, half of the backlash on the line of action.
         mean_stiffness: k_mean.
         natural_frequency: omega_0 / (2 pi); the mesh frequency is Omega times this.
-        mass: on the line of action.
+        mass: equivalent mass m on the line of action [kg].
     """
 
     model: DimensionlessModel
@@ -47,23 +47,23 @@ def from_mesh(
     stiffness: Literal["secant", "tangent"] = "secant",
     clearance: AbstractMeshForce | None = None,
 ) -> Identified:
-    """Identifies omega_0, zeta, B_j and phi_j, F_m, F_aT and F_ah of a mesh.
+    """Identify omega_0, zeta, B_j and phi_j, F_m, F_aT and F_ah of a mesh.
 
-    F_m = F / (b k_mean), B_j and phi_j from the harmonics of the stiffness over its mean, F_ah from those of the
-    unloaded transmission error over b. The modification of the cycle's flanks is in both, so that the model needs no
-    relief of its own; the model of unmodified flanks takes one (`with_relief`).
+    F_m = F / (b k_mean), B_j and phi_j from the harmonics of the stiffness over its mean, F_ah from the harmonics of
+    the unloaded transmission error over b. Both contain the modification of the flanks of the cycle: the model needs no
+    relief. A model of unmodified flanks can get a relief by `with_relief`.
 
     Args:
-        cycle: loaded mesh, one design under one torque above 0.
+        cycle: mesh cycle of one design under one torque above 0.
         mass: equivalent mass on the line of action [kg], m = I_1 I_2 / (I_1 r_b2^2 + I_2 r_b1^2).
-        damping_ratio: zeta; or
-        damping: of the DTE [N s/um], zeta = c / (2 sqrt(m k_mean)).
-        half_clearance: b on the line of action [um]; None for half of the pair's backlash.
+        damping_ratio: damping ratio zeta; None if `damping` is given.
+        damping: damping of the DTE [N s/um], zeta = c / (2 sqrt(m k_mean)); None if `damping_ratio` is given.
+        half_clearance: half clearance b on the line of action [um]; None for half of the backlash.
         torque_fluctuation: F_aT over F_m, at one order.
-        torque_order: of the mesh frequency.
-        orders: harmonics that are kept.
-        stiffness: "secant" gives the static transmission error at this torque, "tangent" small vibrations.
-        clearance: f; None for the dead zone itself. A `PolynomialClearance` holds in its range only.
+        torque_order: order of the torque fluctuation, as a multiple of the mesh frequency.
+        orders: number of harmonics.
+        stiffness: "secant" reproduces the static transmission error at this torque, "tangent" small vibrations.
+        clearance: clearance function f; None for the dead zone. A `PolynomialClearance` is only valid in its range.
 
     Raises:
         ValueError: in one line, for no load, no backlash or not exactly one damping.

@@ -1,4 +1,4 @@
-"""The dimensionless torsional model of a gear pair, as studies of profile modification state it."""
+"""Dimensionless torsional model of a gear pair, as in publications on dynamic profile modification."""
 
 from typing import ClassVar, Literal
 
@@ -21,7 +21,7 @@ ReliefForm = Literal["exact", "first order", "first order as printed"]
 
 
 def loaded_te(clearance: AbstractMeshForce, load: Scalar) -> Scalar:
-    """x > 0 with f(x) = load > 0."""
+    """Positive x with f(x) = load, for a load above 0."""
     if isinstance(clearance, PolynomialClearance):
         return clearance.loaded(load)
     assert isinstance(clearance, DeadZone)  # which the force has checked
@@ -37,8 +37,8 @@ class DimensionlessForce(AbstractMeshForce):
         stiffness_angles: phi_j [rad], shape (orders,).
         relief: C; None for none.
         relief_form: "exact" is f(x - C). "first order" is f(x) - f'(x) C, which the exact one tends to for small C. "as
-            printed" has a plus instead: right only where C adds material or x counts the other way round. Both need a
-            polynomial, since the slope of a dead zone jumps.
+            printed" has a plus instead, which is correct only if C adds material or x has the opposite sign. Both need
+            a polynomial, since the slope of a dead zone jumps.
     """
 
     jumps: ClassVar[bool] = True  # C does where a pair comes or goes
@@ -78,7 +78,7 @@ class DimensionlessForce(AbstractMeshForce):
         return jnp.sort(moved)
 
     def static_te(self, phase: Scalar, force: Scalar) -> Scalar:
-        """x that takes a force; of the exact form C + f^-1(force / stiffness), outside of a false double well."""
+        """Static x under a force; for the exact form C + f^-1(force / stiffness), outside a false double well."""
         place = self.at(phase)
         if self.relief_form != "exact":
             return te_under(self, place, force)
@@ -163,13 +163,16 @@ class DimensionlessModel(Checked):
 
     @property
     def mesh_force(self) -> DimensionlessForce:
-        """Without the excitation."""
+        """Mesh force of the model, without the external excitation."""
         return DimensionlessForce(
             self.clearance, self.stiffness_harmonics, self.stiffness_angles, self.relief, self.relief_form
         )
 
     def oscillator(self) -> Oscillator:
-        """The model as a vector field of x + e, x = `oscillator.dte`; its mesh frequency is Omega / (2 pi)."""
+        """Oscillator of the model with the coordinate x + e, where x = `oscillator.dte`.
+
+        Its mesh frequency is Omega / (2 pi).
+        """
         excitation = Excitation(
             self.torque / self.load, self.torque_angles, self.displacement, self.displacement_angles, self.orders
         )
@@ -195,7 +198,7 @@ def dimensionless_model(
     relief: CycleRelief | None = None,
     relief_form: ReliefForm = "exact",
 ) -> DimensionlessModel:
-    """The model with one harmonic each of torque and displacement, as in the study of dynamic modification.
+    """Dimensionless model with one harmonic each of torque and displacement, as in the paper on dynamic modification.
 
     Args:
         load, damping_ratio: F_m, zeta.
@@ -240,5 +243,5 @@ def rectangular_harmonics(ratio: Given, share: Given, count: int = 5) -> Float[A
 
 
 def with_relief(model: DimensionlessModel, relief: CycleRelief | None) -> DimensionlessModel:
-    """Copy of the model with another modification."""
+    """Copy of a model with another relief; None for no relief."""
     return eqx.tree_at(lambda m: m.relief, model, relief, is_leaf=lambda part: part is None)

@@ -3,12 +3,12 @@ resonances and the thresholds of parametric instability.
 
     y'' + 2 zeta y' + (omega_0^2 + sum Q_n cos) y + (a_2 + sum R_n cos) y^2 + a_3 y^3 = sum P_n(Omega) cos
 
-with y = x - x_m and every cos at n Omega with an angle of its own: that is the mesh force expanded about x_m. Where an
-order resonates, y = A cos(omega t - gamma) + (forced response), and A changes slowly. Forcing, parametric excitation
-and damping count as small of one order, a_2 y^2 likewise, a_3 y^3 as small of the order above.
+with y = x - x_m and every cos at n Omega with its own angle: the mesh force expanded about x_m. At a resonance of an
+order, y = A cos(omega t - gamma) + (forced response), and A changes slowly. Forcing, parametric excitation, damping and
+a_2 y^2 are small of first order, a_3 y^3 of second order.
 
-Reference: Nayfeh, Mook, Nonlinear Oscillations (Wiley 1979), chapters 4 (forced) and 5 (parametric); the sums over
-harmonics of both kinds, for which it has examples only, are derived in the same way.
+Reference: Nayfeh, Mook, Nonlinear Oscillations (Wiley 1979), chapters 4 (forced) and 5 (parametric), which treat single
+harmonics; the sums over harmonics are derived in the same way.
 """
 
 import jax
@@ -28,12 +28,12 @@ _HIGHEST = 6  # order of the mesh frequency that is kept
 
 
 def turned(angle: Float[Array, "*any"]) -> Complex[Array, "*any"]:
-    """e^(i angle)."""
+    """Complex number e^(i angle), angle in rad."""
     return jax.lax.complex(jnp.cos(angle), jnp.sin(angle))
 
 
 def as_complex(part: Float[Array, "*any"]) -> Complex[Array, "*any"]:
-    """With an imaginary part of zero."""
+    """Complex number with an imaginary part of zero."""
     return jax.lax.complex(part, jnp.zeros_like(part))
 
 
@@ -41,7 +41,7 @@ class LoadedMean(Checked):
     """A mesh force expanded about its loaded mean. Complex amplitudes c stand for Re(c e^(i n Omega t)).
 
     Attributes:
-        mean: x_m, where the mesh force has the mean F_m.
+        mean: x_m, at which the mean mesh force is F_m.
         frequency: omega_0 there, sqrt(f') without modification.
         quadratic, cubic: a_2 = f'' / 2, a_3 = f''' / 6.
         damping_ratio: zeta of the model, by which free vibrations decay as exp(-zeta t).
@@ -70,11 +70,11 @@ class LoadedMean(Checked):
         return 3 * self.cubic / (8 * omega) - 5 * self.quadratic**2 / (12 * omega**3)
 
     def forcing(self, frequency: Scalar) -> Lines:
-        """P_n at a mesh frequency Omega, shape (orders,)."""
+        """Forcing amplitudes P_n at a mesh frequency Omega, shape (orders,)."""
         return self.force + as_complex((self.orders * frequency) ** 2) * self.inertia
 
     def receptance_inverse(self, frequency: Float[Array, "*any"]) -> Complex[Array, "*any"]:
-        """omega_0^2 - frequency^2 + 2 i zeta frequency."""
+        """Inverse receptance omega_0^2 - frequency^2 + 2 i zeta frequency."""
         return jax.lax.complex(self.frequency**2 - frequency**2, 2 * self.damping_ratio * frequency)
 
     def response(self, frequency: Scalar, without: int = 0) -> Lines:
@@ -86,10 +86,10 @@ class LoadedMean(Checked):
 
 @program
 def loaded_mean(model: DimensionlessModel) -> LoadedMean:
-    """Expands the mesh force of a model about its loaded mean; orders 1 to 6 of the mesh frequency are kept.
+    """Expand the mesh force of a model about its loaded mean, with orders 1 to 6 of the mesh frequency.
 
-    The clearance must have three derivatives: a dead zone has two lines, a_2 = a_3 = 0. Torque and displacement of
-    other orders than whole ones up to 6 are left out; `combination_forcing` takes them.
+    The clearance should have three derivatives; a dead zone is piecewise linear, a_2 = a_3 = 0. Torque and displacement
+    at orders other than whole numbers up to 6 are ignored; `combination_forcing` covers them.
     """
     force = model.mesh_force
     phase = real(np.arange(_POSITIONS) / _POSITIONS).astype(model.load.dtype)
@@ -136,14 +136,14 @@ def loaded_mean(model: DimensionlessModel) -> LoadedMean:
 
 
 def frequency_shift(state: LoadedMean, frequency: Scalar, resonant: int = 0, parametric: int = 0) -> Scalar:
-    """Second-order shift of omega_0 by forced response and parametric excitation.
+    """Second-order shift of omega_0 by forced response and parametric excitation, dimensionless.
 
     Args:
-        state: the expansion.
-        frequency: Omega.
-        resonant: order that resonates itself, n Omega ~ omega_0; its response is the slow amplitude. 0 for none. The
-            order 2 n then excites parametrically, and is no part of the shift.
-        parametric: order whose difference frequency resonates, n Omega ~ 2 omega_0. 0 for none.
+        state: expansion about the loaded mean.
+        frequency: mesh frequency Omega.
+        resonant: order n in resonance, n Omega ~ omega_0, whose response is the slow amplitude; 0 for none. The order
+            2 n excites parametrically and is not part of the shift.
+        parametric: order n of parametric resonance, n Omega ~ 2 omega_0, which is not part of the shift; 0 for none.
     """
     omega, forced = state.frequency, state.orders * frequency
     line = state.response(frequency, resonant)
@@ -159,16 +159,16 @@ def frequency_shift(state: LoadedMean, frequency: Scalar, resonant: int = 0, par
 
 
 def effective_forcing(state: LoadedMean, frequency: Scalar, order: int) -> Complex[Array, ""]:
-    """Amplitude of all that acts at `order` Omega: P_n itself and what lower orders make there.
+    """Effective forcing amplitude at `order` Omega: P_n plus the nonlinear contributions of lower orders.
 
     Order 2: P_2 - 2 a_2 Lambda_1^2 - Q_1 Lambda_1. Order 3: P_3 - 2 a_3 Lambda_1^3 - R_1 Lambda_1^2 - 4 a_2 Lambda_1
     Lambda_2 - Q_1 Lambda_2 - Q_2 Lambda_1, where Lambda_2 is the whole response at 2 Omega. Half amplitudes Lambda.
     Order 1: P_1.
 
     Args:
-        state: the expansion.
-        frequency: Omega.
-        order: 1, 2 or 3.
+        state: expansion about the loaded mean.
+        frequency: mesh frequency Omega.
+        order: order 1, 2 or 3.
     """
     if order not in (1, 2, 3):
         raise ValueError(f"order = {order!r} must be 1, 2 or 3")

@@ -1,4 +1,4 @@
-"""Dynamic profile modification: the relief whose vibration at one operating condition is least."""
+"""Dynamic profile modification: the relief with the least vibration at one operating condition."""
 
 import operator
 from collections.abc import Mapping, Sequence
@@ -22,7 +22,7 @@ Free = Literal["amount", "length", "curve"]
 
 
 def vector(relief: CycleRelief, free: Sequence[str]) -> Float[Array, " numbers"]:
-    """The free numbers of a relief."""
+    """Free parameters of a relief as a vector, shape (numbers,)."""
     parts = [jnp.ravel(leaf) for name in free for leaf in jax.tree.leaves(getattr(relief, name))]
     if not parts:
         raise ValueError(f"{type(relief.curve).__name__} has no coefficients to optimize")
@@ -34,7 +34,7 @@ Bounds = Mapping[str, tuple[Numbers, Numbers]]  # lowest and highest values of w
 
 
 def made(relief: CycleRelief, free: Sequence[str], vector: Float[Array, " numbers"]) -> CycleRelief:
-    """The relief with other free numbers."""
+    """Relief with other values of its free parameters, shape (numbers,)."""
     for name in free:
         leaves, tree = jax.tree.flatten(getattr(relief, name))
         new = []
@@ -89,15 +89,15 @@ _RATE, _LAST_RATE = 0.05, 0.02  # first step over the width of the bounds, and t
 
 
 class OperatingCondition(NamedTuple):
-    """A row of the table of the study of dynamic modification: which parameters matter where.
+    """Operating condition of dynamic profile modification: a row of the table of the paper on dynamic modification.
 
     Attributes:
-        name: of the resonance.
+        name: name of the resonance.
         frequency: Omega, mesh frequency over omega_0.
         free: parameters of the relief that are optimized.
-        curve: shape of the relief to start from.
-        goal: as the study puts it; `dynamic_profile_modification` minimizes the amplitude everywhere, which is the
-            least velocity only as far as the motion has one harmonic.
+        curve: shape of the relief at the start.
+        goal: goal in the words of the paper; `dynamic_profile_modification` always minimizes the amplitude, which is
+            equivalent to the least velocity only for a motion of one harmonic.
     """
 
     name: str
@@ -108,7 +108,7 @@ class OperatingCondition(NamedTuple):
 
 
 def operating_conditions(frequency: Given = 1.0) -> tuple[OperatingCondition, ...]:
-    """The study's four rows, super-harmonics of order 2 and 3 apart.
+    """The four operating conditions of the paper, with super-harmonics of order 2 and 3 as separate rows.
 
     Args:
         frequency: natural frequency about the loaded mean over omega_0, `LoadedMean.frequency`; 1 for a dead zone.
@@ -126,15 +126,15 @@ def operating_conditions(frequency: Given = 1.0) -> tuple[OperatingCondition, ..
 
 
 class DynamicModification(WithStatus, Checked):
-    """Optimum for one operating condition beside the static one; amplitudes are half of the range of x.
+    """Dynamic optimum for one operating condition, and the static optimum; amplitudes are half of the range of x.
 
     Attributes:
-        frequency: Omega.
-        static, dynamic: relief that minimizes the static and the dynamic amplitude, of the same parameters.
-        amplitude: at this frequency without relief, with the static and with the dynamic one, shape (3,); the larger of
-            the vibrations that two starts settle to.
-        static_amplitude: the same at vanishing speed and steady torque, shape (3,).
-        status: of each of the three, shape (3,).
+        frequency: Omega, mesh frequency over omega_0.
+        static, dynamic: reliefs that minimize the static and the dynamic amplitude, with the same free parameters.
+        amplitude: amplitude at this frequency without relief, with the static and with the dynamic optimum, shape (3,);
+            the larger one of the vibrations from two starts.
+        static_amplitude: amplitude at vanishing speed and steady torque of these three, shape (3,).
+        status: status of these three, shape (3,).
     """
 
     frequency: Scalar = result()
@@ -156,30 +156,31 @@ def dynamic_profile_modification(
     method: Literal["adam", "genetic"] = "adam",
     seed: int = 0,
 ) -> DynamicModification:
-    """The coefficients of a relief that minimize the largest amplitude of a model at one frequency.
+    """Find the parameters of a relief that minimize the amplitude of a model at one frequency.
 
-    The amplitude is that of the study, half of the range of x in the settled vibration. Its gradient is exact (implicit
-    function theorem of the periodic orbit), and Adam follows it with projection onto the bounds, from the given design,
-    the static optimum, twice its numbers, none as far as what is free allows, and the best eight of 1024 spread over
-    the bounds: the amplitude has several minima. The study's genetic algorithm needs no gradient; the best design
-    that it meets competes with the first four. The static optimum minimizes the range of x at vanishing speed within
-    the same parameters. The amplitudes of the result are of four times as many steps as those of the search.
+    The amplitude is half of the range of x in the steady vibration. Its gradient is exact (implicit function theorem of
+    the periodic orbit). As the amplitude has several minima, projected Adam steps start from the given relief, the
+    static optimum, twice the parameters of the static optimum, the relief nearest to none, and the best eight of 1024
+    reliefs spread over the bounds. The genetic algorithm of the paper needs no gradient; its best relief competes with
+    the first four. The static optimum minimizes the range of x at vanishing speed with the same free parameters. The
+    amplitudes of the result use four times as many steps as the search.
 
-    Without torque fluctuation and displacement a relief that keeps the static x constant keeps x constant at every
-    speed: then static and dynamic optimum are the same, but for a parametric instability about it. Beyond the clearance
-    itself C has no part in that instability; in a polynomial f its change of slope has.
+    Without torque fluctuation and displacement, a relief that keeps the static x constant keeps x constant at every
+    speed: static and dynamic optimum then coincide, except for a parametric instability about this state. C affects
+    that instability only by the change of slope of a polynomial f, not for a dead zone.
 
     Args:
-        model: its own relief is left out.
+        model: dimensionless model; its own relief is ignored.
         frequency: Omega, mesh frequency over omega_0.
-        relief: to start from, and what is not free.
-        free: "amount" (C_max), "length" (lambda), "curve" (its coefficients, all of them).
-        bounds: of each; None or left out for `amount` 0 to 4 F_m [half clearances], `length` from a fifth of contact
-            ratio - 1 to half of the contact ratio, `curve` 0.5 to 4 for an exponent and -4 to 4 for coefficients, of a
-            polynomial all but b_0, which stays. A bound of a curve may be a list, one number per coefficient.
-        iterations: steps of Adam, or generations of 40 designs.
-        method: "adam" or "genetic", of bit strings.
-        seed: of the random numbers of "genetic".
+        relief: relief at the start, with the values of parameters that are not free.
+        free: free parameters: "amount" (C_max), "length" (lambda), "curve" (all its coefficients).
+        bounds: (low, high) by the name of the free parameter; defaults: `amount` 0 to 4 F_m [half clearances], `length`
+            from a fifth of contact ratio - 1 to half of the contact ratio, `curve` 0.5 to 4 for an exponent and -4 to 4
+            for coefficients, except b_0 of a polynomial, which is fixed. A bound of a curve may be a list, one number
+            per coefficient.
+        iterations: number of steps of Adam, or of generations of 40 designs.
+        method: "adam", or "genetic" for a genetic algorithm with bit strings.
+        seed: seed of the random numbers of "genetic".
     """
     check("frequency", frequency, "", low=0.0, open_low=True)
     whole("iterations", iterations)
@@ -215,7 +216,7 @@ def dynamic_profile_modification(
 
 
 def modification_table(rows: Sequence[tuple[OperatingCondition, DynamicModification]]) -> str:
-    """A text table: amplitudes at each condition without relief, with the static and with the dynamic optimum."""
+    """Text table of the amplitudes at each condition without relief, with the static and with the dynamic optimum."""
     lines = [f"{'condition':20} {'Omega':>6} {'free':14} {'none':>8} {'static':>8} {'dynamic':>8}  static -> dynamic"]
     for condition, found in rows:
         numbers = " ".join(f"{float(value):8.5f}" for value in found.amplitude)
@@ -288,7 +289,7 @@ def _dynamic_search(model, relief, free, low, high, frequency, units, iterations
 
 @kernel
 def _genetic_search(model, relief, free, low, high, frequency, key, generations, steps):
-    """The best point of the unit box that generations of bit strings meet; the fitness is 1 / amplitude."""
+    """Best point of the unit box found by a genetic algorithm with bit strings; the fitness is 1 / amplitude."""
 
     def value(x):
         return _amplitude(model, made(relief, free, low + (high - low) * x), frequency, steps)[0]
@@ -311,7 +312,7 @@ def _genetic_search(model, relief, free, low, high, frequency, key, generations,
 
 
 def _adam(value, start, iterations: int):
-    """The best point that Adam meets within the unit box, and its value."""
+    """Best point found by Adam within the unit box, and its value."""
     import optax
 
     method = optax.adam(optax.cosine_decay_schedule(_RATE, iterations, _LAST_RATE))

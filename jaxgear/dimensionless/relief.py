@@ -1,4 +1,4 @@
-"""The modification of a mesh as one displacement over the mesh cycle."""
+"""Tip relief of a mesh as one displacement excitation over the mesh cycle."""
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -14,18 +14,18 @@ _SAME_RATIO = 1e-3  # by which two contact ratios may differ and still be those 
 
 
 class CycleRelief(Checked):
-    """Tip relief of both gears as what it takes off the DTE of the whole mesh, C(phase).
+    """Tip relief of both gears as a displacement C(phase) that is subtracted from the DTE of the mesh.
 
-    One pair at the distance t from the begin of its path of contact has lost `amount * curve(delta)`, with delta = s /
-    length from 0 where the relief starts to 1 at the tip, on either end of the path. Of two pairs in contact, equally
-    stiff, the mesh feels the mean: k (q - C_1) + k (q - C_2) = 2 k (q - (C_1 + C_2) / 2). That is what a single C(t)
-    can represent, and it holds while both pairs touch; the mesh force of a contact analysis shares the load as it is.
+    The modification of one pair is `amount * curve(delta)`, with delta from 0 at the start of the relief to 1 at the
+    tip, at both ends of the path of contact. For two equally stiff pairs in contact C is the mean of both,
+    k (q - C_1) + k (q - C_2) = 2 k (q - (C_1 + C_2) / 2), as long as both pairs touch. A contact analysis computes the
+    load sharing instead.
 
     Attributes:
-        amount: C_max at the tip [half clearances].
-        length: lambda, on the line of action [base pitches], at most half of the contact ratio; contact ratio - 1
-            reaches from the tip to the highest point of single contact.
-        contact_ratio: from 1 to 2.
+        amount: amount C_max at the tip [half clearances].
+        length: length lambda on the line of action [base pitches], at most half of the contact ratio; a length of
+            contact ratio - 1 reaches from the tip to the highest point of single contact.
+        contact_ratio: contact ratio, from 1 to 2.
         curve: C / C_max over delta: `Power`, `Quadratic`, `Polynomial`, `Sinusoidal` or any other.
         begin: mesh position where the second pair comes into contact [base pitches].
     """
@@ -37,7 +37,7 @@ class CycleRelief(Checked):
     begin: Scalar = number("base pitches", default=0.0)
 
     def __call__(self, phase: Scalar) -> Scalar:
-        """C [half clearances] at a mesh position [base pitches]."""
+        """Displacement C [half clearances] at a mesh position [base pitches]."""
         turned = phase - self.begin
         first = turned - jnp.floor(turned)
         two = first < self.contact_ratio - 1
@@ -67,7 +67,7 @@ class CycleRelief(Checked):
 
 
 def cycle_relief(relief: TipRelief, pair: GearPair, half_clearance: Given) -> CycleRelief:
-    """Modification over the mesh cycle by the same tip relief on both gears.
+    """Relief over the mesh cycle for the same tip relief on both gears.
 
     Args:
         relief: tip relief of either gear.
@@ -92,18 +92,19 @@ def cycle_relief(relief: TipRelief, pair: GearPair, half_clearance: Given) -> Cy
 
 
 def tip_relief(relief: CycleRelief, pair: GearPair, half_clearance: Given) -> TipRelief:
-    """The tip relief of either gear that takes a modification of the mesh cycle off its flanks.
+    """Tip relief of either gear from a relief over the mesh cycle: the inverse of `cycle_relief`.
 
     The last step of a dynamic profile modification: the distance on the line of action is one of roll length, which
     over the base radius is a roll angle (`tolerance.profile_trace` tabulates the flank over either).
 
     Args:
-        relief: C, as `dynamic_profile_modification` finds it.
-        pair: pinion and wheel that it was found for.
+        relief: relief over the mesh cycle, for instance from `dynamic_profile_modification`.
+        pair: pinion and wheel.
         half_clearance: b, half of the backlash on the line of action [um].
 
     Raises:
-        ValueError: for a half clearance that is not positive, or another contact ratio than that of the pair.
+        ValueError: for a half clearance that is not positive, or if the contact ratio of the relief differs from that
+            of the pair.
     """
     check("half_clearance", half_clearance, "um", low=0.0, open_low=True)
     path = path_of_contact(pair)
@@ -114,10 +115,10 @@ def tip_relief(relief: CycleRelief, pair: GearPair, half_clearance: Given) -> Ti
 
 
 def largest_relief(load: Given, torque_fluctuation: Given, displacement: Given, least_stiffness: Given) -> Scalar:
-    """C_max = (F_m + F_ah + F_aT) / K_min [half clearances], as the study of dynamic modification prints it.
+    """Largest relief C_max = (F_m + F_ah + F_aT) / K_min [half clearances] by the paper on dynamic modification.
 
-    It adds amplitudes of different kinds: F_m and F_aT are forces over b k_mean, but F_ah is a displacement over b,
-    whose force is F_ah Omega^2. In newtons over a stiffness in N/um the rule is sound: `sizing.dynamic_relief`.
+    The rule adds different quantities: F_m and F_aT are forces over b k_mean, but F_ah is a displacement over b, whose
+    force is F_ah Omega^2. `sizing.dynamic_relief` has the consistent rule, with forces in N and a stiffness in N/um.
 
     Args:
         load, torque_fluctuation, displacement: F_m, F_aT, F_ah.

@@ -1,4 +1,4 @@
-"""Response curves and thresholds of the resonances that the method of multiple scales finds."""
+"""Response curves and thresholds of resonances by the method of multiple scales."""
 
 from typing import NamedTuple
 
@@ -34,7 +34,7 @@ class Resonance(Checked):
 
 
 class Backbone(Checked):
-    """A response curve over its amplitude, through its folds.
+    """Response curve as mesh frequencies over the amplitude, through its folds.
 
     Attributes:
         amplitude: A, shape (amplitudes,).
@@ -50,12 +50,13 @@ class Backbone(Checked):
 
 
 def primary_resonance(state: LoadedMean, frequency: Numbers) -> Resonance:
-    """Omega ~ omega_0: (i zeta - s) A + h A* / (2 omega_0) = P_1 / (2 omega_0), with a complex amplitude A.
+    """Primary resonance, Omega ~ omega_0: amplitudes A of the resonant vibration.
 
-    s = Omega - omega_0 - shift - kappa |A|^2, and h = 2 a_2 Lambda_2 + Q_2 / 2: the stiffness harmonic of twice the
-    resonant order excites the same vibration parametrically, and by its phase to that of the forcing makes it larger
-    or smaller. Without it A^2 [(Omega - omega_0 - kappa A^2)^2 + zeta^2] = (P_1 / (2 omega_0))^2. From
-    `damping_threshold` of that order on the vibration would grow without forcing too.
+    The complex amplitude A solves (i zeta - s) A + h A* / (2 omega_0) = P_1 / (2 omega_0), with
+    s = Omega - omega_0 - shift - kappa |A|^2 and h = 2 a_2 Lambda_2 + Q_2 / 2: the stiffness harmonic of twice the
+    resonant order excites the same vibration parametrically and, depending on its phase, increases or decreases it.
+    Without it A^2 [(Omega - omega_0 - kappa A^2)^2 + zeta^2] = (P_1 / (2 omega_0))^2. Below the `damping_threshold` of
+    that order the vibration would also grow without forcing.
 
     Args:
         state: the expansion about the loaded mean.
@@ -65,9 +66,10 @@ def primary_resonance(state: LoadedMean, frequency: Numbers) -> Resonance:
 
 
 def super_harmonic_resonance(state: LoadedMean, frequency: Numbers, order: int = 2) -> Resonance:
-    """order Omega ~ omega_0: the same curve under `effective_forcing`, at the detuning order Omega - omega_0.
+    """Super-harmonic resonance, order Omega ~ omega_0: amplitudes A of the vibration at order Omega.
 
-    A is the amplitude of the vibration at order Omega, beside the forced response at the other orders.
+    The equation is that of `primary_resonance`, with `effective_forcing` and the detuning order Omega - omega_0. The
+    forced response at the other orders adds to this vibration.
 
     Args:
         state: the expansion about the loaded mean.
@@ -78,11 +80,11 @@ def super_harmonic_resonance(state: LoadedMean, frequency: Numbers, order: int =
 
 
 def response_curve(state: LoadedMean, amplitude: Numbers, *, order: int = 1) -> Backbone:
-    """The curve of `primary_resonance` (order 1) or `super_harmonic_resonance` (2, 3) in closed form over A.
+    """Response curve of `primary_resonance` (order 1) or `super_harmonic_resonance` (2, 3) in closed form over A.
 
     Omega = (omega_0 + kappa A^2 + shift + s) / order with the smallest and the largest s of this amplitude, which are
-    -+ sqrt((P / (2 omega_0 A))^2 - zeta^2) where nothing excites parametrically. Forcing, parametric excitation and
-    shift are those at omega_0 / order, so that the curve differs from the exact one in what these change along it.
+    -+ sqrt((P / (2 omega_0 A))^2 - zeta^2) without parametric excitation. Forcing, parametric excitation and shift are
+    evaluated at omega_0 / order; the curve neglects their change along it.
 
     Args:
         state: the expansion about the loaded mean.
@@ -95,11 +97,12 @@ def response_curve(state: LoadedMean, amplitude: Numbers, *, order: int = 1) -> 
 
 
 def sub_harmonic_resonance(state: LoadedMean, frequency: Numbers, *, order: int = 1) -> Resonance:
-    """order Omega ~ 2 omega_0: A cos(order Omega t / 2 - gamma), which needs no forcing at its own frequency.
+    """Sub-harmonic resonance, order Omega ~ 2 omega_0: amplitudes A of A cos(order Omega t / 2 - gamma).
 
+    The vibration needs no forcing at its own frequency:
     kappa A^2 = order Omega / 2 - omega_0 - shift -+ sqrt((|h| / (2 omega_0))^2 - zeta^2), h = 2 a_2 Lambda + Q / 2 of
-    that order: the quadratic term and the stiffness harmonic act alike. Of the two the solution with the larger A is
-    stable; A = 0 is a solution too, stable outside the threshold (`parametric_instability`), and comes first.
+    that order: the quadratic term and the stiffness harmonic have the same effect. The solution with the larger A is
+    stable. A = 0 is a solution too, stable outside the threshold (`parametric_instability`), and comes first.
 
     Args:
         state: the expansion about the loaded mean.
@@ -121,7 +124,8 @@ def parametric_instability(state: LoadedMean, *, order: int = 1) -> tuple[Scalar
 
 
 def damping_threshold(state: LoadedMean, *, order: int = 1) -> Scalar:
-    """Damping ratio zeta from which on nothing is unstable at order Omega ~ 2 omega_0: |h| / (2 omega_0)."""
+    """Damping ratio zeta = |h| / (2 omega_0) above which no parametric instability exists at order Omega ~ 2 omega_0.
+    """
     order = whole("order", order, 1, len(state.orders))
     return jnp.abs(_coupling(state, 2 * state.frequency / order, order)) / (2 * state.frequency)
 
@@ -131,9 +135,9 @@ def combination_forcing(
 ) -> Complex[Array, ""]:
     """Forcing by two excitations of a model at the combination frequency (n_1 + sign n_2) Omega.
 
-    For the orders n_1, n_2 of `model.orders`, which need not be whole: -(4 a_2 Lambda_1 Lambda_2 + Q_1 Lambda_2 + Q_2
-    Lambda_1), with the conjugates of the factors of n_2 for the difference. Where that frequency is near omega_0 the
-    amplitude follows from `forced_amplitude`.
+    The orders n_1, n_2 of `model.orders` need not be whole numbers. The forcing is
+    -(4 a_2 Lambda_1 Lambda_2 + Q_1 Lambda_2 + Q_2 Lambda_1), with conjugate factors of n_2 for the difference. If the
+    combination frequency is near omega_0, `forced_amplitude` gives the amplitude.
 
     Args:
         state: the expansion about the loaded mean.
@@ -177,11 +181,11 @@ class _Slow(NamedTuple):
         return constant, 2 * jnp.real(turned_by), size
 
     def margin(self, zeta: Scalar) -> Scalar:
-        """zeta^2 - |coupling|^2."""
+        """Stability margin zeta^2 - |coupling|^2 of the vibration without forcing."""
         return zeta**2 - jnp.abs(self.coupling) ** 2
 
     def stable(self, state: LoadedMean, squared: Solutions, s: Solutions) -> Bool[Array, "*many"]:
-        """Whether small changes of a solution with |A|^2 at s die out: the slow motion has the trace -2 zeta."""
+        """True if small changes of a solution with |A|^2 at s decay; the trace of the slow motion is -2 zeta."""
         zeta, kappa = state.damping_ratio, state.kappa
         inverse = as_complex(safe_divide(1.0, s**2 + self.margin(zeta)))
         found = inverse * (-jax.lax.complex(s, zeta + 0 * s) * self.forcing - self.coupling * self.forcing.conj())
@@ -253,7 +257,7 @@ def _instability(state: LoadedMean, order: int) -> tuple[Scalar, Scalar]:
 
 
 def _own(order: int) -> int:
-    """The order that resonates itself where `order` excites parametrically; 0 for none."""
+    """Order in forced resonance when `order` excites parametrically, half of it; 0 for an odd order."""
     return order // 2 if order % 2 == 0 else 0
 
 

@@ -1,4 +1,4 @@
-"""The settled vibration of an oscillator with one coordinate, by fixed steps, and its derivatives."""
+"""Steady vibration of a dimensionless model by fixed steps, with derivatives."""
 
 import dataclasses
 
@@ -27,22 +27,22 @@ def settled_vibration(
     periods: int = 2,
     steps: int = 96,
 ) -> Orbit:
-    """The vibration that a model settles to from a state; differentiable in the model and the frequency.
+    """Steady vibration of a model from an initial state, differentiable with respect to the model and the frequency.
 
-    Its numbers are dimensionless: displacements in half clearances, forces over b k_mean, and the mesh frequency is
-    Omega / (2 pi). The status is `Status.NO_STEADY_MOTION` where the state still changes over the recorded cycles, the
-    orbit is unstable, or the vibration left the range of a polynomial.
+    The results are dimensionless: displacements in half clearances, forces over b k_mean, and the mesh frequency is
+    Omega / (2 pi). The status is `Status.NO_STEADY_MOTION` if the state still changes over the recorded cycles, the
+    orbit is unstable, or the vibration has left the range of a polynomial.
 
-    Derivatives are those of the periodic orbit (implicit function theorem over the recorded cycles), not of the way to
-    it; where it has not settled they are those of the recorded cycles from a fixed state.
+    Derivatives are those of the periodic orbit (implicit function theorem over the recorded cycles). If the motion has
+    not settled they are those of the recorded cycles from a fixed initial state.
 
     Args:
         model: dimensionless model.
         frequency: Omega, mesh frequency over omega_0.
-        start: (x, x') at mesh position 0 in place of the loaded mean at rest, shape (2,).
-        settling: mesh cycles before the recorded ones; transients fade by exp(-2 pi zeta / Omega) in each.
-        periods: mesh cycles that are recorded, a multiple of the vibration's period: 2 for sub-harmonics of order 1/2.
-        steps: per mesh cycle, Runge-Kutta of order four.
+        start: state (x, x') at mesh position 0, shape (2,); None for the loaded mean at rest.
+        settling: number of mesh cycles before the recorded cycles; transients decay by exp(-2 pi zeta / Omega) in each.
+        periods: number of recorded mesh cycles, a multiple of the period: 2 for sub-harmonics of order 1/2.
+        steps: Runge-Kutta steps of order four per mesh cycle.
     """
     check("frequency", frequency, "", low=0.0, open_low=True)
     for name, value in (("settling", settling), ("periods", periods), ("steps", steps)):
@@ -53,7 +53,7 @@ def settled_vibration(
 
 
 def at_rest(model: DimensionlessModel) -> Float[Array, " two"]:
-    """The loaded mean without vibration: (x_m, 0)."""
+    """State (x_m, 0) of the loaded mean without vibration, shape (2,)."""
     mean = loaded_te(model.clearance, model.load)
     shift = jnp.zeros_like(mean) if model.relief is None else jnp.mean(jax.vmap(model.relief)(_phases(64)))
     return jnp.stack([mean + shift, jnp.zeros_like(mean)])

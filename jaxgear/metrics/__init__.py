@@ -1,6 +1,6 @@
-"""Free functions on a `MeshCycle`: what the loaded mesh means for noise, strength and losses.
+"""Functions of a `MeshCycle` for noise, strength and losses.
 
-Those of `flank` take a prepared `Mesh` and the modifications instead: what has to be ground.
+The functions of `flank` describe the material to be ground and take a prepared `Mesh` and the modifications instead.
 """
 
 from ..numerics.reductions import AbstractReduction as AbstractReduction

@@ -1,4 +1,4 @@
-"""One design under one load: what quantities are worked out from."""
+"""Analysis of one design under one load, from which quantities are computed."""
 
 from collections.abc import Callable, Hashable, Sequence
 from typing import Any, TypeVar
@@ -16,27 +16,27 @@ Settings = TypeVar("Settings", bound=Checked)
 
 
 class Analysis:
-    """A design under a load, and what further analyses make of it: each when it is asked for first, and once.
+    """Mesh cycle of a design under a load, with further analyses that are computed on first use and then reused.
 
-    Quantities take a mesh cycle, which is all that most of them need, or an analysis, which those need that solve
-    further on the mesh: of vibration, of worn flanks.
+    Most quantities need only a mesh cycle. Quantities with further solutions on the mesh, such as vibration and wear,
+    need an analysis:
 
         worst = Dynamics(frequencies, damping_ratio=0.05).quantity("worst_dynamic_factor")
         worst(Analysis(cycle, mesh))
 
-    It is made where a cycle is, inside what `jax.jit` or `jax.vmap` trace, and is no pytree.
+    Make an analysis next to its cycle, inside a function that `jax.jit` or `jax.vmap` traces; it is not a pytree.
 
     Attributes:
-        cycle: the solved mesh cycle of the design.
-        mesh: that it was solved on; None where nothing is solved further.
-        shared: settings that several quantities have in common, see `share_settings`.
+        cycle: solved mesh cycle of the design.
+        mesh: prepared mesh of the cycle; None if no quantity needs it.
+        shared: settings shared by several quantities, see `share_settings`.
     """
 
     def __init__(self, cycle: MeshCycle, mesh: Mesh | None = None, shared: Sequence[Checked] = ()) -> None:
-        """Takes a cycle and the mesh that it was solved on.
+        """Make an analysis from a cycle and its mesh.
 
         Raises:
-            ValueError: for a cycle with batch axes beside a mesh: map over it with `jax.vmap`, so that the mesh is not
+            ValueError: for a mesh and a cycle with batch axes: use `jax.vmap` over the cycle, so that the mesh is not
                 repeated.
         """
         if cycle.batch_ndim and mesh is not None:
@@ -57,10 +57,10 @@ class Analysis:
 
     @property
     def prepared_mesh(self) -> Mesh:
-        """The mesh, for a quantity that solves further on it.
+        """Prepared mesh, for quantities with further solutions.
 
         Raises:
-            ValueError: where there is none.
+            ValueError: if the analysis has no mesh.
         """
         if self.mesh is None:
             raise ValueError("needs the prepared mesh besides the cycle, give it Analysis(cycle, mesh)")
@@ -68,12 +68,12 @@ class Analysis:
 
     @property
     def deviation(self) -> Float[Array, "pairs slices positions"]:
-        """Material that deviations have removed from the gears, besides their modifications [um].
+        """Material removed by deviations, in addition to the modifications [um], shape (pairs, slices, positions).
 
-        Of a cycle whose modifications are not known it is all that was removed.
+        If the cycle does not contain its modifications, it is the total material removed.
 
         Raises:
-            ValueError: where there is no mesh.
+            ValueError: if the analysis has no mesh.
         """
         cycle, mesh = self.cycle, self.prepared_mesh
         removed = removed_material(mesh, cycle.torque, **self.flanks)
@@ -83,14 +83,14 @@ class Analysis:
         return jax.lax.stop_gradient(deviation)  # of the design it does not depend but by rounding
 
     def once(self, settings: Checked, what: Hashable, work: Callable[[], _Found]) -> _Found:
-        """work(), or what it gave before for the same settings: compilers do not find out that two loops do the same.
+        """Result of work(), computed once per settings and name; compilers do not merge equal loops.
 
-        What was found while one function was being traced is not for another one.
+        A result computed during one trace is not reused in another trace.
 
         Args:
-            settings: the very object that the work depends on.
-            what: is worked out with them, by name.
-            work: traceable; nothing else that changes may be in it.
+            settings: settings that the work depends on, compared by identity.
+            what: name of the result.
+            work: traceable function that depends on nothing else that changes.
         """
         now = get_opaque_trace_state()
         for trace, known, name, found in self._found:

@@ -17,18 +17,18 @@ Curve = Float[Array, " positions"]
 
 @over_batch
 def total_contact_ratio(cycle: MeshCycle) -> Scalar:
-    """eps_gamma = eps_alpha + eps_beta, transverse contact ratio and overlap ratio."""
+    """Total contact ratio eps_gamma = eps_alpha + eps_beta, sum of transverse contact ratio and overlap ratio."""
     return cycle.kinematics.path_of_contact.contact_ratio + cycle.kinematics.pair.overlap_ratio
 
 
 def contact_line_lengths(pair: GearPair) -> tuple[Scalar, Scalar]:
-    """Least and mean length of the contact lines of all pairs together over the cycle [mm], theoretical.
+    """Least and mean total length of the theoretical contact lines of all pairs over the cycle [mm].
 
         mean   b eps_alpha / cos(beta_b)
         least  the mean less min(n_a n_b, (1 - n_a) (1 - n_b)) / eps_beta b / cos(beta_b)
 
-    with the fractions n_a and n_b that the transverse contact ratio and the overlap ratio have beyond whole numbers.
-    Of spur gears the least one is the face width times the whole pairs.
+    with the fractional parts n_a of the transverse contact ratio and n_b of the overlap ratio. For spur gears the least
+    length is the face width times the integer part of the contact ratio.
     """
     transverse, overlap = path_of_contact(pair).contact_ratio, pair.overlap_ratio
     beyond, over = transverse - jnp.floor(transverse), overlap - jnp.floor(overlap)
@@ -40,13 +40,13 @@ def contact_line_lengths(pair: GearPair) -> tuple[Scalar, Scalar]:
 
 @over_batch
 def axial_force(cycle: MeshCycle) -> Scalar:
-    """Axial force of the mesh, F_bt tan(abs(beta_b)) [N], on the pinion one way and on the wheel the other way."""
+    """Axial force F_bt tan(abs(beta_b)) of the mesh [N], in opposite directions on pinion and wheel."""
     return cycle.force * jnp.abs(cycle.kinematics.pair.path_slope)
 
 
 @over_batch
 def tilting_moments(cycle: MeshCycle) -> tuple[Scalar, Scalar]:
-    """Moment F_ax r_w by which the axial force tilts pinion and wheel [N m], with their working pitch radii."""
+    """Tilting moments F_ax r_w of the axial force on pinion and wheel, with their working pitch radii [N m]."""
     pair, force = cycle.kinematics.pair, 1e-3 * axial_force(cycle)
     secant = 1 / jnp.cos(pair.working_pressure_angle)
     return force * pair.pinion.base_radius * secant, force * pair.wheel.base_radius * secant
@@ -56,8 +56,8 @@ def tilting_moments(cycle: MeshCycle) -> tuple[Scalar, Scalar]:
 def shuttling_moment(cycle: MeshCycle) -> Curve:
     """Moment of the forces on the line of action about the middle of the common face, sum of q y dy [N m].
 
-    Positive where the load is at positive face coordinates. Of helical gears it goes back and forth while the contact
-    lines pass over the face, and so excites their bearings.
+    It is positive for a load at positive face coordinates. For helical gears it alternates while the contact lines pass
+    over the face, and excites the bearings.
     """
     of = cycle.kinematics
     return 1e-3 * jnp.einsum("psn,s->n", cycle.line_load, of.face_coordinate * of.slice_width)

@@ -33,18 +33,19 @@ class Harmonics(Checked):
 def peak_to_peak(curve: Curve) -> Float[Array, "..."]:
     """Largest minus smallest value over the positions (PPTE for a transmission error, in um).
 
-    Its gradient is that of two positions, of the largest and of the smallest value; where several positions share an
-    extreme value, that of the first of them. Report it, and optimize `smooth_peak_to_peak` or harmonics where gradients
-    are followed. NaN at any position gives NaN, also on backends whose reductions drop it.
+    The gradient depends on the positions of the largest and of the smallest value only; if several positions share an
+    extreme value, on the first of them. For gradient methods use `smooth_peak_to_peak` or harmonics instead. NaN at any
+    position gives NaN, also on backends whose reductions drop it.
 
-    It knows a curve and no status: the transmission error of a mesh cycle that has not converged is finite. Under
-    `jax.jit` and `jax.vmap` take `optimize.evaluate("ppte", ...)`, which gives NaN there, or look at `cycle.converged`.
+    The function does not check convergence: the transmission error of a mesh cycle that has not converged is finite.
+    Under `jax.jit` and `jax.vmap` use `optimize.evaluate("ppte", ...)`, which returns NaN in this case, or check
+    `cycle.converged`.
 
     Args:
-        curve: values over the positions, which are the last axis.
+        curve: values, shape (..., positions).
 
     Returns:
-        largest minus smallest value, in the unit of the curve, of the shape of the other axes.
+        largest minus smallest value in the unit of the curve, shape (...).
     """
     return spread(curve, axis=-1)
 
@@ -94,20 +95,20 @@ def _amplitudes_and_phases(curve, count, first):
 
 @over_batch
 def relative_transmission_error(cycle: MeshCycle) -> Curve:
-    """Loaded transmission error over its mean; its peak to peak is PPTE as a share of the mean loaded error.
+    """Loaded transmission error divided by its mean; its peak-to-peak value is PPTE relative to the mean.
 
-    It compares gears of different size and load. With no load the error has no mean, and the result is 0.
+    Use it to compare gears of different size and load. Without load the result is 0.
     """
     return safe_divide(cycle.transmission_error, jnp.mean(cycle.transmission_error))
 
 
 @over_batch
 def force_excitation(cycle: MeshCycle) -> Curve:
-    """Force by which the mesh excites vibration [N]: k(psi) (TE(psi) - mean TE), with the local mesh stiffness k.
+    """Excitation force of the mesh k(psi) (TE(psi) - mean TE) [N], with the tangent mesh stiffness k.
 
-    Gears of great inertia turn uniformly, at the mean transmission error: the force between their flanks differs from
-    the static one by this much, to first order. With a constant stiffness it is that times the variation of the loaded
-    transmission error, the excitation of linear models.
+    To first order it is the deviation of the mesh force from the static force if gears of large inertia turn uniformly
+    at the mean transmission error. With a constant stiffness it is the excitation of linear models: stiffness times the
+    variation of the loaded transmission error.
 
     References:
         H. N. Ozguven, D. R. Houser, J. Sound Vib. 125 (1988) 71-83, on the loaded static transmission error as the
@@ -123,10 +124,11 @@ def excited_by(error: Curves, stiffness: Curves) -> Curves:
 
 @over_batch
 def secant_stiffness(cycle: MeshCycle) -> Float[Array, " positions"]:
-    """Average slope k = F / (loaded - unloaded transmission error) [N/um]; 0 at zero torque.
+    """Secant mesh stiffness k = F / (loaded - unloaded transmission error) [N/um], shape (positions,); 0 at zero
+    torque.
 
-    It serves static deflections; for small vibrations about the loaded state use `cycle.tangent_stiffness`, the local
-    slope (Cooley, Liu, Dai, Parker, Mech. Mach. Theory 105 (2016) 540-553). The secant falls in the hand-over between
-    pairs even where nothing softens.
+    Use it for static deflections; for small vibrations about the loaded state use `cycle.tangent_stiffness`, the local
+    slope (Cooley, Liu, Dai, Parker, Mech. Mach. Theory 105 (2016) 540-553). The secant stiffness decreases during the
+    transition between pairs even if the tangent stiffness does not.
     """
     return safe_divide(cycle.force, cycle.transmission_error - cycle.unloaded_transmission_error)

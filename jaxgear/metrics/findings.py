@@ -1,6 +1,6 @@
-"""Numbers out of the usual range: what an experienced engineer would ask about.
+"""Warnings about values outside the usual range.
 
-One table of limits serves inputs and results alike. Nothing is refused here: a finding is a warning.
+One table of limits covers inputs and results. A finding is a warning, never an error.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
@@ -97,7 +97,7 @@ class Finding(NamedTuple):
 
     @property
     def is_unusual(self) -> bool:
-        """Whether the number is out of its usual range."""
+        """True if the value is outside its usual range."""
         return not self.usual.holds(self.value)
 
     @property
@@ -120,14 +120,14 @@ def of_limits(
     low: float | None = None,
     high: float | None = None,
 ) -> Finding:
-    """The finding about a number, whose usual range may be known better than the table has it."""
+    """Finding about a value, with the usual range of the table or with other limits `low` and `high`."""
     usual = limits[key]
     usual = usual._replace(low=usual.low if low is None else low, high=usual.high if high is None else high)
     return Finding(key, where, float(value), usual)
 
 
 def unusual(findings: Iterable[Finding]) -> tuple[Finding, ...]:
-    """The findings whose number is out of its usual range."""
+    """Findings whose value is outside the usual range."""
     return tuple(finding for finding in findings if finding.is_unusual)
 
 
@@ -146,20 +146,20 @@ def findings_of(
     verified: float | None = None,
     support_deflection: float = 0.0,
 ) -> tuple[Finding, ...]:
-    """Findings about a solved design: numbers out of their usual range; empty if there are none.
+    """Findings about a solved design: values outside their usual range; empty if there are none.
 
     Args:
         cycle: solved cycle of one design at one torque, not traced.
-        pinion, wheel: modifications; None for those of the cycle.
+        pinion, wheel: modifications; None for the modifications of the cycle.
         torque_range: lowest and highest torque of interest [N m].
-        speed: speed of the pinion [rpm]; None for that of the cycle.
-        friction: coefficient of friction; None for that of the cycle.
-        oil_friction: coefficient of friction that a law gives; None without a lubricant.
+        speed: speed of the pinion [rpm]; None for the speed of the cycle.
+        friction: coefficient of friction; None for the value of the cycle.
+        oil_friction: coefficient of friction by a law of the lubricant; None without a lubricant.
         bulk_temperature: bulk temperature of the teeth [degC]; None without a lubricant.
-        lubricant: the oil; None without one.
-        compliance: compliance that the cycle was solved with; None for one that is composed of models.
-        verified: PPTE of the same design by the finite-element structure [um]; None if not known.
-        support_deflection: part of the mean transmission error by shafts, bearings and housing [um].
+        lubricant: lubricant; None without one.
+        compliance: compliance of the cycle; None for a compliance composed of models.
+        verified: PPTE of the design by the finite-element structure [um]; None if not computed.
+        support_deflection: mean transmission error due to shafts, bearings and housing [um].
     """
     flanks = tuple(given or own or NoModification() for given, own in ((pinion, cycle.pinion), (wheel, cycle.wheel)))
     rpm = cycle.operating_point.speed if speed is None else speed
@@ -205,12 +205,12 @@ def findings_of(
 def finding_of_claim(
     ppte: float, compliance: AbstractCompliance | None = None, verified: float | None = None
 ) -> tuple[Finding, ...]:
-    """The finding about a PPTE of modified flanks that is less than a model can tell; else nothing.
+    """Finding about a PPTE of modified flanks below the accuracy of the model; empty otherwise.
 
     Args:
-        ppte: claimed [um].
-        compliance: by which it was found; None for one that is composed of models.
-        verified: PPTE of the same design by the finite-element structure, where it is known [um].
+        ppte: computed PPTE [um].
+        compliance: compliance of the computation; None for a compliance composed of models.
+        verified: PPTE of the design by the finite-element structure [um]; None if not computed.
     """
     finding = _finding("PPTE by finite elements" if isinstance(compliance, TabulatedCompliance) else "PPTE", "", ppte)
     if verified is not None:

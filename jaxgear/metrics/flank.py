@@ -1,8 +1,8 @@
 """Demands of a modification on the grinding machine: amounts, monotony and volume of the material removed.
 
-All functions take a prepared mesh, or the `Kinematics` that a mesh and its cycles hold, and the modifications of both
-gears (None for the nominal involute). They look at the active profile, from its start to the tip, and across the common
-face width. They need no solution of the contact, are differentiable, compiled, and work under `vmap`.
+All functions take a prepared mesh, or the `Kinematics` of a mesh or a cycle, and the modifications of both gears (None
+for the nominal involute). They evaluate the active profile, from its start to the tip, and the common face width. They
+need no solution of the contact, are differentiable and compiled, and support `vmap`.
 """
 
 from typing import NamedTuple
@@ -30,10 +30,10 @@ class FlankSurface(NamedTuple):
     """One gear's active flank, from the start of its active profile to the tip and across its own face width.
 
     Attributes:
-        roll_length: [mm], shape (points,).
-        roll_angle: [deg], shape (points,).
-        diameter: [mm], shape (points,).
-        face_coordinate: from the middle of the face [mm], shape (lines,).
+        roll_length: roll lengths [mm], shape (points,).
+        roll_angle: roll angles [deg], shape (points,).
+        diameter: diameters [mm], shape (points,).
+        face_coordinate: face coordinates from the middle of the face [mm], shape (lines,).
         removed: material that the modification removes [um], shape (lines, points).
     """
 
@@ -46,7 +46,7 @@ class FlankSurface(NamedTuple):
 
 @program
 def flank_surface(side: Side, modification: AbstractModification) -> FlankSurface:
-    """The active flank of one gear with its modification: what charts, tables and findings show."""
+    """Active flank of one gear with its modification, for charts, tables and findings."""
     roll = _roll_lengths(side, _SHOWN_POINTS)
     face = jnp.linspace(-0.5, 0.5, _SHOWN_LINES, dtype=roll.dtype) * side.face_width
     removed = removed_at(side, modification, roll, face)
@@ -102,10 +102,10 @@ def relief_reversal(
     pinion: AbstractModification | None = None,
     wheel: AbstractModification | None = None,
 ) -> Scalar:
-    """Sum of the decreases of the material removed on the ways from the pitch point to tip and root [um].
+    """Sum of the decreases of the material removed from the pitch point towards tip and root [um].
 
-    It is that of the worse gear, in the middle of the face: zero for a monotone relief, and the depth of the dip for
-    one that dips. A profile slope decreases on one of the ways.
+    The value is that of the worse gear in the middle of the face: zero for a monotone relief, the depth of the dip for
+    a relief with a dip. A profile slope decreases in one of the directions.
     """
     worst = [_decrease(side, modification) for side, modification in _flanks(mesh, pinion, wheel)]
     return maximum(jnp.stack(worst))
@@ -149,17 +149,17 @@ def removed_at(
     roll_length: Profile,
     face_coordinate: Float[Array, "..."] | None = None,
 ) -> Float[Array, "*lines points"]:
-    """Material that the modification of one gear removes at given places [um].
+    """Material removed by the modification of one gear at given points [um].
 
     Args:
-        side: the gear's side of the contact, of `mesh.sides`.
-        modification: of that gear.
-        roll_length: shape (points,) [mm].
-        face_coordinate: lines along the profile, from the middle of the gear's own face, shape (lines,) [mm]; None for
-            one line in the middle.
+        side: side of the gear in the contact, from `mesh.sides`.
+        modification: modification of the gear.
+        roll_length: roll lengths [mm], shape (points,).
+        face_coordinate: face coordinates of the lines along the profile, from the middle of the face of the gear [mm],
+            shape (lines,); None for one line in the middle.
 
     Returns:
-        shape (lines, points), or (points,) without a face coordinate.
+        material removed [um], shape (lines, points), or (points,) without a face coordinate.
     """
     face = jnp.zeros((1,), roll_length.dtype) if face_coordinate is None else face_coordinate
     removed = modification(side.flank(roll_length[None], face[:, None]))

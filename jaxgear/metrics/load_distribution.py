@@ -1,4 +1,4 @@
-"""How pairs share the load, over which part of the path they carry it, and how uneven it is over the face.
+"""Load distribution: load sharing of pairs, loaded part of the path of contact, and face load factors.
 
 References:
     ISO 6336-1, clause 7: K_Hbeta is the largest over the mean load per face width, K_Fbeta follows from it and the
@@ -27,9 +27,10 @@ class ContactShock(Checked):
     """Contact beyond the theoretical path of contact.
 
     Attributes:
-        approach: loaded path length before its start, where the wheel's tip corner touches; of helical gears in the
-            slice where it is longest.
-        recess: loaded path length after its end, where the pinion's tip corner touches, likewise.
+        approach: loaded path length before the start of the path of contact, where the tip corner of the wheel touches
+            [mm]; for helical gears the longest of all slices.
+        recess: loaded path length after the end of the path of contact, where the tip corner of the pinion touches
+            [mm]; for helical gears the longest of all slices.
         force: largest force on a pair beyond the theoretical path of contact [N].
     """
 
@@ -40,7 +41,8 @@ class ContactShock(Checked):
 
 @over_batch
 def load_sharing(cycle: MeshCycle) -> Float[Array, "pairs positions"]:
-    """Share of every pair in the total force; the shares of a position sum to 1, or are 0 at zero torque."""
+    """Share of every pair in the total force, shape (pairs, positions); the sum over pairs is 1, or 0 at zero torque.
+    """
     return _shares(replace(cycle, pinion=None, wheel=None))
 
 
@@ -53,16 +55,16 @@ def _shares(cycle: MeshCycle):
 def effective_contact_ratio(cycle: MeshCycle) -> Scalar:
     """Loaded length of the path of contact in base pitches, the mean number of loaded pairs.
 
-    A pair counts as loaded where any of its slices is. Ends of contact are interpolated linearly between positions, so
-    the value changes continuously with the design. Above the theoretical contact ratio the teeth meet with their
-    corners.
+    A pair is loaded if any of its slices is loaded. The ends of contact are interpolated linearly between positions, so
+    that the value is a continuous function of the design. A value above the theoretical contact ratio indicates corner
+    contact.
     """
     return jnp.sum(jnp.mean(_loaded_fraction(minimum(cycle.opening, axis=1)), axis=-1))
 
 
 @over_batch
 def contact_shock(cycle: MeshCycle) -> ContactShock:
-    """Loaded path beyond its theoretical ends and the largest corner force there."""
+    """Loaded path length beyond the ends of the path of contact, and the largest corner force."""
     kinematics = cycle.kinematics
     contact, path = kinematics.path_of_contact, kinematics.contact_path
     fraction = _loaded_fraction(cycle.opening if kinematics.helical else minimum(cycle.opening, axis=1))
@@ -88,7 +90,7 @@ def corner_force(cycle: MeshCycle) -> Float[Array, "pairs positions"]:
 
 
 def slice_forces(cycle: MeshCycle) -> Float[Array, "pairs slices positions"]:
-    """Force of every slice [N]: `pair_force`, divided in proportion to the loads of the slices."""
+    """Force of every slice [N], shape (pairs, slices, positions): `pair_force` in proportion to the line loads."""
     load = cycle.line_load * cycle.kinematics.slice_width[None, :, None]
     return load * over_slices(safe_divide(cycle.pair_force, jnp.sum(load, axis=1)))
 
@@ -112,11 +114,11 @@ Curve = Float[Array, " positions"]
 
 
 class _Face(NamedTuple):
-    """Load over the face.
+    """Line load over the face.
 
     Attributes:
-        line_load: slices last [N/mm].
-        width: of every slice [mm].
+        line_load: line load [N/mm], shape (..., slices).
+        width: width of every slice [mm], shape (slices,).
     """
 
     line_load: Float[Array, "... slices"]
@@ -130,8 +132,9 @@ class _Face(NamedTuple):
 
 @over_batch
 def face_load_factors(cycle: MeshCycle) -> Curve:
-    """Largest over mean line load over the face at every position, of the pair with the largest line load there; of
-    helical gears, of all pairs together.
+    """Largest over mean line load over the face at every position, shape (positions,).
+
+    It refers to the pair with the largest line load; for helical gears to the sum of all pairs.
 
     Raises:
         ValueError: for a cycle of one slice.
@@ -141,13 +144,13 @@ def face_load_factors(cycle: MeshCycle) -> Curve:
 
 @over_batch
 def face_load_factor(cycle: MeshCycle) -> Scalar:
-    """K_Hbeta: largest over mean line load over the face, of the pair and at the position with the largest line load.
+    """Face load factor K_Hbeta: largest over mean line load, for the pair and the position of the largest line load.
 
-    Of helical gears it is `mean_face_load_factor`: their contact lines run across the profile too, so that a single
-    line is uneven by a tip relief, which ratings must not count as a fault of the face. For lead modifications of 10 to
-    20 um on a face of 6 modules both differ by 3 % or less where the angle goes to zero.
+    For helical gears it is `mean_face_load_factor`: their contact lines also run across the profile, so that a tip
+    relief makes a single line uneven, which is not a load concentration over the face. For lead modifications of 10 to
+    20 um on a face width of 6 modules both definitions differ by 3 % at most as the helix angle tends to zero.
 
-    Differentiable where that pair and position stay the same.
+    The derivative is that of a fixed pair and position.
 
     Raises:
         ValueError: for a cycle of one slice.
@@ -157,8 +160,9 @@ def face_load_factor(cycle: MeshCycle) -> Scalar:
 
 @over_batch
 def mean_face_load_factor(cycle: MeshCycle) -> Scalar:
-    """Largest over mean load over the face, of all pairs together and of the mean over the cycle: what a model with one
-    stiffness over the face calls K_Hbeta (ISO 6336-1, Annex E).
+    """Largest over mean load over the face, for the sum of all pairs and the mean over the cycle.
+
+    This is K_Hbeta of a model with one constant stiffness over the face (ISO 6336-1, Annex E).
 
     Raises:
         ValueError: for a cycle of one slice.
@@ -181,10 +185,9 @@ def root_face_load_factor(cycle: MeshCycle) -> Scalar:
 
 @over_batch
 def edge_load_factor(cycle: MeshCycle) -> Scalar:
-    """Larger line load of both end slices over the mean over the face, where `face_load_factor` is taken; 0 at ends
-    that carry nothing.
+    """Larger line load of both end slices over the mean over the face, for the load of `face_load_factor`.
 
-    At a free end without relief it grows slowly with the number of slices.
+    It is 0 if both ends are unloaded. At a free end without relief it grows slowly with the number of slices.
 
     Raises:
         ValueError: for a cycle of one slice.
@@ -197,7 +200,7 @@ def edge_load_factor(cycle: MeshCycle) -> Scalar:
 
 
 def over_several_slices(factor: Callable[[MeshCycle], Scalar], cycle: MeshCycle) -> Scalar | float:
-    """A factor of this module, 1 on one slice, over which the load is even."""
+    """Factor of this module for a cycle of several slices; 1 for one slice."""
     return factor(cycle) if cycle.kinematics.resolution.slices > 1 else 1.0
 
 

@@ -1,4 +1,4 @@
-"""The quantities of this package, and a mesh cycle in a few of them."""
+"""Quantities of this package, and a summary of a mesh cycle by the most important ones."""
 
 from collections.abc import Iterator
 from functools import partial
@@ -47,9 +47,9 @@ def _contact_pressure(cycle: MeshCycle) -> Load:
 
 
 def mean_removed_material(cycle: MeshCycle) -> Scalar:
-    """Material removed from both flanks together, mean over the contacts on the path of contact [um].
+    """Total material removed from both flanks, mean over the contacts on the path of contact [um].
 
-    It breaks ties among designs of equal transmission error: what is not removed need not be ground.
+    Use it to choose the design with the least grinding among designs of equal transmission error.
     """
     inside = cycle.kinematics.contact_outside <= 0
     # on the path of contact unmodified flanks have no gap: what is there is the modification
@@ -368,7 +368,7 @@ _OVER_FACE = ("face_load_factor", "root_face_load_factor", "edge_load_factor")  
 
 @over_batch
 def summary(cycle: MeshCycle) -> dict[str, Float[Array, ""]]:
-    """The numbers that engineers ask for first, by name and unit; traceable, so it can be vmapped."""
+    """Values of the most important quantities of a mesh cycle, by name and unit; traceable, supports `jax.vmap`."""
     names = _SUMMARY if cycle.kinematics.resolution.slices == 1 else (*_SUMMARY, *_OVER_FACE)
     names = (*names, *_OBLIQUE) if cycle.kinematics.helical else names
     return {

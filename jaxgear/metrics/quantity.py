@@ -22,8 +22,8 @@ Numbers = Float[Array, "..."]
 class AbstractSettings(Checked):
     """Settings that some quantities need besides a mesh cycle: lubricant, strengths, masses, running time.
 
-    A quantity with settings names their class in `takes`; the method `quantity` of the settings gives the quantity
-    computed with them. A class of your own is defined as those of the library are:
+    A quantity with settings names their class in `takes`; the method `quantity` of the settings returns the quantity
+    computed with them. Define your own class like those of the library:
 
         class Microphone(AbstractSettings):
             table = "microphone"
@@ -42,15 +42,15 @@ class AbstractSettings(Checked):
     table: ClassVar[str] = ""
 
     def quantity(self, name: str) -> "Quantity":
-        """A quantity of these settings, for objectives, constraints, sweeps, Pareto fronts and tables.
+        """Quantity computed with these settings, for objectives, constraints, sweeps, Pareto fronts and tables.
 
-        The settings may be traced: what is compiled for one quantity serves other numbers in them, too.
+        The settings may be traced: programs compiled for a quantity also serve other values of the settings.
 
         Args:
-            name: of the vocabulary, without the unit.
+            name: name in the vocabulary, without the unit.
 
         Raises:
-            ValueError: for the name of no quantity of these settings, and where a field is missing that it needs.
+            ValueError: for an unknown quantity of these settings, and if a required field is missing.
         """
         known = _OF_SETTINGS.get(type(self), {})
         if name not in known:
@@ -61,37 +61,37 @@ class AbstractSettings(Checked):
 
 
 class Shared(eqx.Module):
-    """Stands in a quantity for the settings of this number that an `Analysis` shares, see `share_settings`."""
+    """Placeholder of settings in a quantity: index of the shared settings of an `Analysis`, see `share_settings`."""
 
     number: int = eqx.field(static=True)
 
 
 class Quantity(eqx.Module):
-    """A number of a mesh cycle, with its name and unit; call it with a cycle, or with an `Analysis`.
+    """Named quantity of a mesh cycle with unit; call it with a cycle or an `Analysis`.
 
-    A name of the vocabulary, or a quantity of your own, is taken wherever a quantity is asked for:
+    Every argument for a quantity takes a name of the vocabulary or your own quantity:
 
         ripple = Quantity("ripple", lambda cycle: cycle.tangent_stiffness, "N/um", reduction=Range())
 
     Attributes:
-        name: as tables and design files call it.
+        name: name in tables and design files.
         of: computes it from one solved cycle, or with `takes` from an `Analysis` and the settings: a single number, or
             an array that the reduction makes one of. Traced, so it must be pure; every use of one quantity shares
             compiled programs as long as it is the same function.
         unit: "" for a pure number.
         meaning: in a few words.
-        reduction: makes one number of an array, over all its axes. Linear programs keep the extremes of `Max`, `Min`
-            and `Range` exact, and gradient methods soften them.
-        better: whether small or large values are the better ones: what is minimized, worst, or on a front.
-        local: whether the array has positions last and its values at a position depend on the material removed at that
-            position alone, as those of transmission error, line load and pressure do. It only saves time.
-        label: as tables and figures call it; "" for the name in words.
-        form: how tables format the number, as in `format`.
-        takes: class of the settings that it is computed with; None for a cycle alone.
+        reduction: reduction of an array to one number, over all its axes. Linear programs keep the extremes of `Max`,
+            `Min` and `Range` exact; gradient methods soften them.
+        better: "smaller" or "larger": direction of improvement for objectives, worst cases and fronts.
+        local: True if positions are the last axis and the value at a position depends only on the material removed at
+            that position, as for transmission error, line load and pressure. It only saves time.
+        label: name in tables and figures; "" for the name in words.
+        form: format of the value in tables, as in `format`.
+        takes: class of the required settings; None for a cycle alone.
         needs: field of the settings that must be given; "" for none.
-        without: fields of the operating point with which it is known without settings too, which are None for `of`
-            then; None where it always takes settings.
-        settings: that it is computed with, which may be traced; None in the vocabulary.
+        without: operating-point fields that can replace the settings; `of` then gets None. None if settings are always
+            required.
+        settings: settings of the quantity, which may be traced; None in the vocabulary.
     """
 
     name: str = eqx.field(static=True)
@@ -115,22 +115,22 @@ class Quantity(eqx.Module):
 
     @property
     def heading(self) -> str:
-        """In words with the unit: `PPTE [um]`, `contact ratio`."""
+        """Label with the unit: `PPTE [um]`, `contact ratio`."""
         return self.key.heading
 
     @property
     def named(self) -> str:
-        """Name with the unit in brackets, as objectives carry it: `ppte [um]`."""
+        """Name with the unit in brackets, for objectives: `ppte [um]`."""
         return f"{self.name} [{self.unit}]" if self.unit else self.name
 
     @property
     def key(self) -> UnitKey:
-        """Name with the unit, as tables and summaries carry it: `ppte_um`, `max_line_load_N_per_mm`."""
+        """Name with the unit, for tables and summaries: `ppte_um`, `max_line_load_N_per_mm`."""
         return UnitKey(self.name, self.unit, self.words)
 
     @property
     def sign(self) -> int:
-        """1 where small values are the better ones, else -1."""
+        """Sign of the quantity in a minimization: 1 if smaller values are better, else -1."""
         return 1 if self.better == "smaller" else -1
 
     def __repr__(self) -> str:
@@ -138,11 +138,11 @@ class Quantity(eqx.Module):
         return f"Quantity({self.named!r}, {self.meaning!r}{given})"
 
     def with_settings(self, settings: AbstractSettings) -> "Quantity":
-        """The quantity computed with settings.
+        """Copy of the quantity that is computed with settings.
 
         Raises:
-            TypeError: for settings of another class than it takes.
-            ValueError: where a field is missing that it needs.
+            TypeError: for settings of another class than `takes`.
+            ValueError: if the field `needs` of the settings is None.
         """
         given = type(settings).__name__
         if self.takes is None or not isinstance(settings, self.takes):
@@ -152,7 +152,7 @@ class Quantity(eqx.Module):
         return replace(self, settings=settings)
 
     def __call__(self, analysis: Analysis | MeshCycle) -> Numbers:
-        """The number, of every cycle where the cycle has leading axes from `jax.vmap`."""
+        """Value of the quantity; with the leading axes of a batched cycle."""
         if isinstance(analysis, MeshCycle):
             return over_batch(lambda cycle: self(Analysis(cycle)))(analysis)
         return self.reduction(self.values(analysis).ravel())
@@ -161,7 +161,7 @@ class Quantity(eqx.Module):
         """Values of one cycle before the reduction, in their own shape.
 
         Raises:
-            ValueError: when it is neither a number nor an array, or an array without a reduction, and where settings
+            ValueError: if the result is neither a number nor an array, or an array without a reduction, and if settings
                 are missing.
         """
         if isinstance(analysis, MeshCycle):
@@ -204,11 +204,11 @@ class Vocabulary(Mapping[str, Quantity]):
     def __init__(
         self, known: Iterable[Quantity] = (), *, further: Callable[[], Iterable[Quantity]] | None = None
     ) -> None:
-        """Holds some quantities.
+        """Make a vocabulary.
 
         Args:
-            known: the quantities.
-            further: called at the first look-up, gives quantities to be added.
+            known: quantities of the vocabulary.
+            further: function that returns further quantities, called at the first look-up.
         """
         self._here: dict[str, Quantity] = {}
         self._others: dict[str, list[Quantity]] = {}
@@ -224,13 +224,13 @@ class Vocabulary(Mapping[str, Quantity]):
         return self._here
 
     def add(self, *quantities: Quantity) -> None:
-        """Adds quantities.
+        """Add quantities.
 
         A name that is taken may be that of another quantity too where both are of settings: which of them is meant is
         then said by the settings, `every`.
 
         Raises:
-            ValueError: for a name that is taken.
+            ValueError: for a name that exists already.
         """
         for quantity in quantities:
             known = self.every(quantity.name)
@@ -265,17 +265,17 @@ class Vocabulary(Mapping[str, Quantity]):
         return () if found is None else (found, *self._others.get(found.name, ()))
 
     def not_known(self, name: object) -> str:
-        """That a name is not known, with the nearest known one."""
+        """Message that a name is unknown, with the nearest known name."""
         known = [*self, *(each.key for each in self.values())]
         near = difflib.get_close_matches(str(name), known, n=1, cutoff=_NEAR)
         hint = f'did you mean "{near[0]}"?' if near else f"must be one of {', '.join(self)}"
         return f'"{name}" is not known, {hint}'
 
     def quantity_of(self, of: str | Quantity | Callable[[MeshCycle], Any]) -> Quantity:
-        """The quantity that is meant by a name in either spelling, a `Quantity`, or a function of a cycle.
+        """Quantity of a name in either spelling, of a `Quantity`, or of a function of a cycle.
 
         Args:
-            of: the quantity; a function is taken for a quantity of its own name that gives a single number.
+            of: name, quantity, or function that returns a single number; a quantity made of a function has its name.
 
         Raises:
             ValueError: for an unknown name, with the nearest known one.
@@ -296,12 +296,12 @@ class Vocabulary(Mapping[str, Quantity]):
 
 
 def share_settings(quantities: Sequence[Quantity]) -> tuple[tuple[Quantity, ...], tuple[AbstractSettings, ...]]:
-    """Quantities that can be static, and the settings of all of them, every one once.
+    """Separate quantities from their settings, without duplicates, so that the quantities can be static arguments.
 
-    An `Analysis` with these settings works out once what several quantities need of the same ones.
+    An `Analysis` with these settings computes results shared by several quantities only once.
 
     Args:
-        quantities: with their settings, concrete or traced.
+        quantities: quantities with settings, concrete or traced.
 
     Returns:
         the quantities with a `Shared` in place of settings, and the settings, for `Analysis(cycle, mesh, settings)`.
@@ -319,7 +319,7 @@ def share_settings(quantities: Sequence[Quantity]) -> tuple[tuple[Quantity, ...]
 
 
 def _same(one: AbstractSettings, other: AbstractSettings) -> bool:
-    """Whether settings are the same object, or of equal concrete numbers."""
+    """True if two settings are the same object or have equal concrete numbers."""
     if one is other:
         return True
     flat: list[Any] = [jax.tree.flatten(settings) for settings in (one, other)]

@@ -1,4 +1,4 @@
-"""The interface of a flank modification and its composition with `+`, `-` and factors."""
+"""Interface of flank modifications, and their composition with `+`, `-` and factors."""
 
 from abc import abstractmethod
 
@@ -24,7 +24,7 @@ class Flank(Checked):
         start_roll_length: roll length at the start of the active profile.
         base_radius: base radius of the gear.
         face_coordinate: position along the face of the gear, from its middle.
-        face_width: of the gear, which may be wider than its mate.
+        face_width: face width of the gear, which may be wider than its mate.
     """
 
     roll_length: Float[Array, "..."] = result("mm")
@@ -39,7 +39,7 @@ class AbstractModification(Checked):
     """Material removed from a flank. Modifications add up with `+` and `sum`; a number scales them.
 
     Raises:
-        TypeError: when something else than a modification is added, or something else than a number is the factor.
+        TypeError: if the other term of a sum is not a modification, or the factor is not a number.
     """
 
     __array_ufunc__ = None  # NumPy's numbers leave the product to `__rmul__`
@@ -51,7 +51,7 @@ class AbstractModification(Checked):
     @property
     @abstractmethod
     def varies_along_face(self) -> bool:
-        """Whether slices of one flank differ, so that a mesh of one slice cannot show the modification."""
+        """True if the modification varies along the face, which a mesh of one slice cannot represent."""
 
     def __add__(self, other: "AbstractModification") -> "Sum":
         if not isinstance(other, AbstractModification):
@@ -79,7 +79,7 @@ class AbstractModification(Checked):
 
 
 class Sum(AbstractModification):
-    """Several modifications on one flank, the result of `+`."""
+    """Sum of several modifications on one flank, the result of `+`."""
 
     terms: tuple[AbstractModification, ...]
 
@@ -98,7 +98,7 @@ class Sum(AbstractModification):
 
 
 class Scaled(AbstractModification):
-    """A modification times a number, the result of `*`."""
+    """Modification times a number, the result of `*`."""
 
     factor: Float[Array, ""] = number("")
     modification: AbstractModification
@@ -113,7 +113,7 @@ class Scaled(AbstractModification):
 
 
 class NoModification(AbstractModification):
-    """The nominal involute."""
+    """Nominal involute, without material removed."""
 
     varies_along_face = False
 
@@ -122,7 +122,7 @@ class NoModification(AbstractModification):
 
 
 def acts(amount: Float[Array, "..."]) -> bool:
-    """Whether an amount is or may become another than zero: a traced one may."""
+    """True if an amount is traced or not zero everywhere."""
     known = concrete(amount)
     return known is None or bool(known.any())
 

@@ -26,24 +26,26 @@ class AbstractCurve(Checked):
 
 
 class Linear(AbstractCurve):
-    """d"""
+    """Linear relief, d."""
 
     def __call__(self, d: Real) -> Real:
         return d
 
 
 class Parabolic(AbstractCurve):
-    """0.44 d + 0.56 d^2"""
+    """Parabolic relief, 0.44 d + 0.56 d^2."""
 
     def __call__(self, d: Real) -> Real:
         return d * (0.44 + 0.56 * d)
 
 
 class Power(AbstractCurve):
-    """d^exponent; 1.5 is Walker's form, 1 to 2 are usual. At exponents below 1 the slope at the start is infinite.
+    """Power-law relief, d^exponent.
+
+    Walker's form has the exponent 1.5; 1 to 2 are usual. For exponents below 1 the slope at the start is infinite.
 
     Attributes:
-        exponent: of the relative depth.
+        exponent: exponent of the relative depth.
     """
 
     exponent: Float[Array, ""] = number("", low=0.0, open_low=True)
@@ -53,7 +55,7 @@ class Power(AbstractCurve):
 
 
 class Quadratic(AbstractCurve):
-    """b0 + b1 d + b2 d^2. A non-zero b0 is a step at the start of the relief.
+    """Quadratic relief, b0 + b1 d + b2 d^2; a non-zero b0 is a step at the start of the relief.
 
     Attributes:
         b0, b1, b2: coefficients of the constant, linear and quadratic term.
@@ -68,10 +70,10 @@ class Quadratic(AbstractCurve):
 
 
 class Polynomial(AbstractCurve):
-    """sum_i coefficients[i] d^i, lowest power first.
+    """Polynomial relief, sum_i coefficients[i] d^i.
 
     Attributes:
-        coefficients: of the powers of the relative depth, lowest first, shape (terms,).
+        coefficients: coefficients of the powers of the relative depth, lowest power first, shape (terms,).
     """
 
     coefficients: Float[Array, " terms"] = number("", shape=("terms",))
@@ -84,7 +86,7 @@ class Polynomial(AbstractCurve):
 
 
 class ParabolicLinear(AbstractCurve):
-    """Parabola c d^2 up to the node n, from there on its tangent c n (2 d - n), with c = 1 / (2 n - n^2).
+    """Parabola c d^2 up to the node n, continued by its tangent c n (2 d - n), with c = 1 / (2 n - n^2).
 
     Value and slope are continuous in the depth and in the node. A node of 1 is the pure parabola; towards 0 the curve
     becomes the straight line.
@@ -104,7 +106,7 @@ class ParabolicLinear(AbstractCurve):
 
 
 class Sinusoidal(AbstractCurve):
-    """sin(b0 d + b1) + cos(b0 d + b2). It starts from zero only if sin(b1) = -cos(b2).
+    """Sinusoidal relief, sin(b0 d + b1) + cos(b0 d + b2); it starts from zero only if sin(b1) = -cos(b2).
 
     Attributes:
         b0, b1, b2: factor of the relative depth, and phases of sine and cosine.

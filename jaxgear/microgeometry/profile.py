@@ -1,7 +1,7 @@
 """Modifications along the profile and along the face width, by the names of ISO 21771.
 
-Each counts over the face of its own gear, on which it is ground: of a gear that is wider than its mate, the ends of the
-face and what is removed there may lie beyond the contact.
+Each modification refers to the face of the gear on which it is ground: if a gear is wider than its mate, the ends of
+its face and their reliefs may lie outside the contact.
 """
 
 from typing import Literal

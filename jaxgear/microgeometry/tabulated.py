@@ -17,7 +17,7 @@ class TabulatedProfile(AbstractModification):
     Attributes:
         position: increasing table positions, shape (points,).
         amount: material removed, shape (points,).
-        coordinate: what the positions are: "roll_length" [mm] (default) or "roll_angle" [deg].
+        coordinate: coordinate of the positions: "roll_length" [mm] (default) or "roll_angle" [deg].
         method: "linear", or "natural_cubic" for a natural cubic spline, or "monotonic" for a shape-preserving cubic.
     """
 
@@ -49,10 +49,10 @@ class TabulatedFlank(AbstractModification):
     Along the profile it is interpolated as in `TabulatedProfile`, over the face linearly.
 
     Attributes:
-        roll_length: increasing, shape (points,).
-        face_coordinate: increasing, from the middle of the face, shape (faces,).
+        roll_length: increasing roll lengths, shape (points,).
+        face_coordinate: increasing face coordinates, from the middle of the face, shape (faces,).
         amount: material removed, shape (points, faces).
-        method: along the profile: "linear", "natural_cubic" or "monotonic".
+        method: interpolation along the profile: "linear", "natural_cubic" or "monotonic".
     """
 
     roll_length: Float[Array, " points"] = number("mm", shape=("points",), fewest=2)

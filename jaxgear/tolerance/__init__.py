@@ -1,8 +1,8 @@
 """Manufacturing deviations of a design: tolerances, random deviations within them, and charts of measuring machines.
 
-Deviations are material removed in um like every modification: positive into the flank, of either sign. Slopes turn
-about the middle of the profile or the face, as `ProfileSlope` and `LeadSlope` do, and the waviness has neither mean nor
-slope, so that each deviation is what a gear measuring machine reports under that name.
+Deviations are material removed in um, like modifications: positive into the flank, with either sign. Slopes turn about
+the middle of the profile or the face, as `ProfileSlope` and `LeadSlope` do, and the waviness has neither mean nor
+slope. Each deviation therefore corresponds to the deviation of the same name in a report of a gear measuring machine.
 """
 
 from .chart import FlankDeviations as FlankDeviations

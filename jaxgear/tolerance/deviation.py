@@ -27,13 +27,14 @@ _SHAPE_POINTS = 129  # at which the height of a waviness is taken: 32 per shorte
 
 
 class GearDeviation(Checked):
-    """Deviations of one gear, positive where material is missing; a leading axis for several samples.
+    """Deviations of one gear, positive for missing material; a leading axis for several samples.
 
     Attributes:
-        profile_slope: as the amount of `ProfileSlope`, shape (*samples,).
-        waviness: coefficients of the profile form deviation, shape (*samples, 2 * HARMONICS); see `Waviness`.
-        pitch: displacement of the tooth of every pair, shape (*samples, pairs).
-        helix_slope: as the amount of `LeadSlope`, over the gear's own face, shape (*samples,).
+        profile_slope: profile slope deviation, as the amount of `ProfileSlope` [um], shape (*samples,).
+        waviness: coefficients of the profile form deviation [um], shape (*samples, 2 * HARMONICS); see `Waviness`.
+        pitch: displacement of the tooth of every pair [um], shape (*samples, pairs).
+        helix_slope: helix slope deviation over the face of the gear, as the amount of `LeadSlope` [um], shape
+            (*samples,).
     """
 
     profile_slope: Real = result("um")
@@ -78,10 +79,10 @@ class Waviness(AbstractModification):
 
 
 class ManufacturedGears(Checked):
-    """Pairs of manufactured gears within a tolerance, by which designs are judged.
+    """Random manufactured gear pairs within a tolerance, for the evaluation of designs.
 
-    Sample i depends on the seed and on i alone, not on the number of samples, and is a smooth function of the limits:
-    the same seed gives common random numbers for every design and every tolerance.
+    Sample i depends only on the seed and on i, not on the number of samples, and is a smooth function of the limits:
+    the same seed gives common random numbers for all designs and tolerances.
 
     Attributes:
         tolerance: limits and distribution of the deviations.
@@ -97,7 +98,7 @@ class ManufacturedGears(Checked):
         """Random deviations of all pairs, with a leading axis (samples,).
 
         Args:
-            mesh: prepared mesh; its number of pairs and its floating-point type count, nothing else.
+            mesh: prepared mesh, of which only the number of pairs and the floating-point type are used.
 
         Raises:
             ValueError: for lead deviations on a mesh of one slice.
@@ -112,7 +113,7 @@ def _sampled(tolerance: Tolerance, mesh: Mesh, key: PRNGKeyArray, samples: int) 
 
 
 def deviation_of(tolerance: Tolerance, mesh: Mesh, key: PRNGKeyArray, number: int | Int[Array, ""]) -> Deviation:
-    """One sample, of the given number."""
+    """Random deviation of the sample with a given number."""
     pinion, wheel, shafts = jax.random.split(jax.random.fold_in(key, number), 3)
     draw, dtype = tolerance.distribution, mesh.slice_width.dtype
     return Deviation(
@@ -133,33 +134,33 @@ def deviated_material(
 ) -> RemovedMaterial:
     """Material removed from both flanks of one manufactured pair, for `solve_removed`: design plus deviations.
 
-    Differentiable with respect to design and deviation, hence to the tolerance limits behind it.
+    It is differentiable with respect to design and deviation, and so to the tolerance limits.
 
     Args:
         mesh: prepared mesh.
-        torque: on the pinion [N m], scalar.
-        deviation: one sample; `jax.vmap` for several, which then share everything that depends on the mesh alone.
+        torque: torque on the pinion [N m], shape ().
+        deviation: one sample; use `jax.vmap` for several, which then share all computations on the mesh.
         pinion: modification of the pinion flank; None for the nominal involute.
         wheel: modification of the wheel flank; None for the nominal involute.
 
     Returns:
-        that of the design, with the deviations added to its amount.
+        the material removed by the design, with the deviations added to its amount.
     """
     design = removed_material(mesh, torque, pinion=pinion, wheel=wheel)
     return design + deviation_field(deviation, flank_basis(mesh, torque))
 
 
 def deviation_field(deviation: Deviation, basis: Float[Array, "terms pairs slices positions"]) -> Load:
-    """Material that the deviations of one sample remove [um], from the `flank_basis` of its mesh."""
+    """Material removed by the deviations of one sample [um], shape (pairs, slices, positions), from `flank_basis`."""
     pitch = deviation.pinion.pitch + deviation.wheel.pitch
     return jnp.tensordot(_coefficients(deviation), basis, 1) + pitch[:, None, None]
 
 
 def flank_basis(mesh: Mesh, torque: Torque) -> Float[Array, "terms pairs slices positions"]:
-    """Material that every flank deviation of unit size removes [um per um].
+    """Material removed per unit of every flank deviation [um/um], shape (terms, pairs, slices, positions).
 
-    Around its nominal place, where the contact meets a deviation, that is linear, so that samples differ by their
-    coefficients only: contacts slide down the slopes of the design and not down those of a deviation.
+    It is evaluated at the nominal contact points, so that samples differ only by their coefficients: the contact shift
+    includes the slopes of the design, but not of the deviations.
     """
     unit = real(1.0).astype(mesh.slice_width.dtype)
     waves = jnp.eye(2 * HARMONICS, dtype=mesh.slice_width.dtype)

@@ -1,4 +1,4 @@
-"""Tolerance limits of a gear pair, by ISO 1328-1:2013 for one, and how deviations are distributed between them."""
+"""Tolerance limits of a gear pair, for instance by ISO 1328-1:2013, and distributions of deviations between them."""
 
 from abc import abstractmethod
 from collections.abc import Sequence
@@ -26,9 +26,9 @@ class AbstractDistribution(Checked):
 
 
 class TruncatedNormal(AbstractDistribution):
-    """Normal distribution with the limits at `sigmas` standard deviations, and nothing beyond: inspected parts.
+    """Normal distribution truncated at the limits, which lie at `sigmas` standard deviations: inspected parts.
 
-    Three is the usual reading of a tolerance on a capable process (0.27 % of the parts sorted out).
+    Three standard deviations are usual for a capable process (0.27 % of the parts are rejected).
     """
 
     sigmas: Float[Array, ""] = number("", low=0.0, open_low=True, default=3.0)
@@ -39,7 +39,7 @@ class TruncatedNormal(AbstractDistribution):
 
 
 class Uniform(AbstractDistribution):
-    """Every value between the limits is as likely: nothing is known but the tolerance."""
+    """Uniform distribution between the limits, if nothing but the tolerance is known."""
 
     def __call__(self, key: PRNGKeyArray, shape: tuple[int, ...], dtype: np.dtype) -> Draws:
         return jax.random.uniform(key, shape, dtype, -1.0, 1.0)
@@ -79,43 +79,43 @@ class ToleranceClass(Checked):
 
     @property
     def single_pitch(self) -> Scalar:
-        """f_pT [um]: between two neighbouring teeth."""
+        """Single pitch tolerance f_pT, between neighbouring teeth [um]."""
         return self._step * (0.001 * self.diameter + 0.4 * self.module + 5)
 
     @property
     def total_pitch(self) -> Scalar:
-        """F_pT [um]: between any two teeth of the gear."""
+        """Total cumulative pitch tolerance F_pT, between any two teeth of the gear [um]."""
         linear = 0.002 * self.diameter + 0.7 * self.module + 12
         return self._step * (linear + 0.55 * jnp.sqrt(self.diameter))
 
     @property
     def profile_slope(self) -> Scalar:
-        """f_HalphaT [um]: rise of the mean profile line over the evaluated profile."""
+        """Profile slope tolerance f_HalphaT: rise of the mean profile line over the evaluated profile [um]."""
         return self._step * (0.4 * self.module + 0.001 * self.diameter + 4)
 
     @property
     def profile_form(self) -> Scalar:
-        """f_falphaT [um]: width of the band around the mean profile line."""
+        """Profile form tolerance f_falphaT: width of the band around the mean profile line [um]."""
         return self._step * (0.55 * self.module + 5)
 
     @property
     def profile_total(self) -> Scalar:
-        """F_alphaT [um]."""
+        """Total profile tolerance F_alphaT [um]."""
         return jnp.hypot(self.profile_slope, self.profile_form)
 
     @property
     def helix_slope(self) -> Scalar:
-        """f_HbetaT [um]: rise of the mean helix line over the face width."""
+        """Helix slope tolerance f_HbetaT: rise of the mean helix line over the face width [um]."""
         return self._step * (0.05 * jnp.sqrt(self.diameter) + 0.35 * jnp.sqrt(self.face_width) + 4)
 
     @property
     def helix_form(self) -> Scalar:
-        """f_fbetaT [um]: width of the band around the mean helix line."""
+        """Helix form tolerance f_fbetaT: width of the band around the mean helix line [um]."""
         return self._step * (0.07 * jnp.sqrt(self.diameter) + 0.45 * jnp.sqrt(self.face_width) + 4)
 
     @property
     def helix_total(self) -> Scalar:
-        """F_betaT [um]."""
+        """Total helix tolerance F_betaT [um]."""
         return jnp.hypot(self.helix_slope, self.helix_form)
 
     @property
@@ -124,7 +124,7 @@ class ToleranceClass(Checked):
 
 
 def iso_rounded(tolerance: Given) -> Float[Array, "..."]:
-    """A tolerance [um] as the standard states it: above 10 to 1, from 5 to 10 to 0.5, below 5 to 0.1.
+    """Tolerance rounded by the standard [um]: above 10 um to 1, from 5 to 10 um to 0.5, below 5 um to 0.1.
 
     Totals are formed before rounding. The steps have no gradient.
     """
@@ -172,17 +172,17 @@ class GearTolerance(Checked):
 
 
 class Tolerance(Checked):
-    """Limits of everything that a sample of manufactured gears may deviate by, and the distribution in between.
+    """Limits of the deviations of manufactured gears, and the distribution between them.
 
-    All deviations are independent of each other. Left out are the helix form, which slices without mutual support
-    cannot show, and the slow part of the cumulative pitch deviation: over the few teeth in mesh at a time it is a
-    constant, which shifts the transmission error and leaves its variation alone.
+    All deviations are independent of each other. Two deviations are not modelled: the helix form, which uncoupled
+    slices cannot represent, and the long-wave part of the cumulative pitch deviation, which is constant over the few
+    teeth in mesh and shifts the transmission error without changing its variation.
 
     Attributes:
         pinion, wheel: limits of the two gears.
-        misalignment: of the shafts in the plane of action, over the face width, of either sign; None without.
-            Needs a mesh of several slices.
-        distribution: of every deviation between its limits.
+        misalignment: limit of the misalignment in the plane of action, over the face width, of either sign; None for
+            none. It needs a mesh of several slices.
+        distribution: distribution of every deviation between its limits.
 
     Raises:
         ValueError: for a negative or non-finite limit.
@@ -237,9 +237,9 @@ class Tolerance(Checked):
 
 
 def check_slices(tolerance: Tolerance, mesh: Mesh) -> None:
-    """Raises a `ValueError` when the tolerance has lead deviations and the mesh has one slice, which cannot show them.
+    """Raise a `ValueError` if the tolerance has lead deviations and the mesh has only one slice.
 
-    A traced limit counts as one: its derivative would be zero.
+    A traced limit counts as a lead deviation: its derivative would be zero.
     """
     if mesh.resolution.slices > 1:
         return
