@@ -1,4 +1,4 @@
-"""Under what a design is judged: loads, manufactured gears, and how the cases are joined into one number."""
+"""Conditions for the evaluation of designs: loads, manufactured gears, and measures over all cases."""
 
 from .cases import Cases as Cases
 from .cases import Conditions as Conditions

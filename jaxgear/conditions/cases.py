@@ -1,4 +1,4 @@
-"""The loads and manufactured pairs with which a design is judged."""
+"""Loads and manufactured gears for the evaluation of designs."""
 
 from collections.abc import Callable
 from typing import TypeVar
@@ -17,14 +17,14 @@ from ..tolerance.deviation import deviation_field, flank_basis
 
 
 class LoadSpectrum(Checked):
-    """Several torques, each with the share of time or revolutions that it is run for.
+    """Load spectrum: several torques, each with its share of time or revolutions.
 
     Attributes:
-        torques: on the pinion, shape (torques,).
-        weights: shares, which sum to 1, shape (torques,).
-        speeds: of the pinion at every torque, shape (torques,); None where nothing asks for them.
-        friction: mean coefficient of friction at all of them; None for the default of whatever needs it.
-        duration: of all of them together, for a life; None where nothing asks for it.
+        torques: torques on the pinion, shape (torques,).
+        weights: shares of the torques, which sum to 1, shape (torques,).
+        speeds: speeds of the pinion at every torque, shape (torques,); None for no speeds.
+        friction: mean coefficient of friction for all torques; None for the default of each quantity.
+        duration: total duration of all loads, for a life; None for no duration.
     """
 
     torques: Float[Array, " torques"] = number("N m", low=0.0, shape=("torques",))
@@ -47,8 +47,8 @@ class LoadSpectrum(Checked):
             torques: on the pinion [N m], all different unless they have speeds.
             weights: of any sum; None for equal shares.
             speeds: of the pinion [rpm], one per torque or one for all; None for none.
-            friction: mean coefficient of friction; None for the default of whatever needs it.
-            duration: of all loads together [h], of which the weights are shares; None for none.
+            friction: mean coefficient of friction; None for the default of each quantity.
+            duration: total duration of all loads [h], of which the weights are shares; None for none.
 
         Raises:
             ValueError: for torques, weights or speeds that are negative, not finite or of different number, loads that
@@ -111,7 +111,7 @@ class LoadSpectrum(Checked):
         return None if self.duration is None else self.weights * self.duration
 
     def turns(self) -> Float[Array, " torques"]:
-        """Revolutions of the pinion at every torque; their shares, the weights, without a duration.
+        """Revolutions of the pinion at every torque, shape (torques,); the weights if there is no duration.
 
         Raises:
             ValueError: for a duration without speeds.
@@ -124,7 +124,7 @@ class LoadSpectrum(Checked):
 
     @staticmethod
     def of(operating_point: OperatingPoint) -> "LoadSpectrum":
-        """A spectrum of a single load."""
+        """Load spectrum of a single load."""
         torque, speed = operating_point.torque, operating_point.speed
         return LoadSpectrum(_alone(torque), None, None if speed is None else _alone(speed), operating_point.friction)
 
@@ -141,14 +141,14 @@ Result = TypeVar("Result")  # a tree of arrays
 
 
 class Conditions(Checked):
-    """Conditions to judge designs by, independent of the mesh: loads, and the manufactured gears under each.
+    """Conditions for the evaluation of designs, independent of the mesh: loads, and manufactured gears for each load.
 
-    All designs meet the same gears, and so do all loads (common random numbers): what is compared differs by the design
-    and the load alone.
+    All designs and all loads are evaluated with the same gears (common random numbers): results differ only by the
+    design and the load.
 
     Attributes:
         load: torques and their weights.
-        deviations: of the manufactured gears, with a leading axis (samples,); None for nominal gears.
+        deviations: deviations of the manufactured gears, with a leading axis (samples,); None for nominal gears.
     """
 
     load: LoadSpectrum
@@ -165,7 +165,7 @@ class Conditions(Checked):
         return len(self.load.torques) * self.samples
 
     def on(self, mesh: Mesh) -> "Cases":
-        """The cases on a mesh; traceable, where every design has a mesh of its own."""
+        """Cases on a mesh; traceable, for designs with their own mesh."""
         check_torque(mesh.support_torque, self.load.torques)
         load = jax.tree.map(lambda numbers: numbers.astype(mesh.slice_width.dtype), self.load)
         removed = None if self.deviations is None else _removed(mesh, load.torques, self.deviations)
@@ -175,14 +175,14 @@ class Conditions(Checked):
 class Cases(Checked):
     """Conditions on a mesh.
 
-    What a deviation removes depends on the mesh and the torque, not on the flanks' design: it is worked out once.
+    The material removed by deviations depends on the mesh and the torque, not on the design: it is computed once.
 
     Attributes:
-        torque: on the pinion [N m], shape (torques,).
-        speed: of the pinion at every torque [rpm], shape (torques,); None where nothing asks for it.
-        friction: mean coefficient of friction; None for the default of whatever needs it.
-        weight: of every torque, sum 1, shape (torques,).
-        removed: material that deviations remove [um], shape (torques, samples, pairs, slices, positions); None for
+        torque: torques on the pinion [N m], shape (torques,).
+        speed: speeds of the pinion at every torque [rpm], shape (torques,); None for no speeds.
+        friction: mean coefficient of friction; None for the default of each quantity.
+        weight: weight of every torque, sum 1, shape (torques,).
+        removed: material removed by deviations [um], shape (torques, samples, pairs, slices, positions); None for
             nominal gears.
     """
 
@@ -204,18 +204,18 @@ class Cases(Checked):
 
     @property
     def first(self) -> OperatingPoint:
-        """The first load."""
+        """Operating point of the first load."""
         return OperatingPoint(self.torque[0], None if self.speed is None else self.speed[0], self.friction)
 
     @property
     def weights(self) -> Float[Array, " cases"]:
-        """Weight of every case, torques first; sum 1."""
+        """Weight of every case, sum 1, shape (cases,); samples vary fastest."""
         return _repeated(self.weight, self.samples)
 
     def each(self, function: Callable[[OperatingPoint, Float[Array, "..."]], Result]) -> Result:
-        """function(operating_point, removed) in every case, with a leading axis (cases,); the torques run slowest.
+        """Values of function(operating_point, removed) in every case, leading axis (cases,); torques vary slowest.
 
-        A single case is not mapped, so that it costs no more than a plain call.
+        A single case is a plain call without a map.
         """
 
         def at(load: tuple[Array, Array | None], removed: Array) -> Result:
@@ -236,9 +236,9 @@ def conditions(mesh: Mesh, torque: Loads, manufactured: ManufacturedGears | None
     """Conditions of a torque or a load spectrum.
 
     Args:
-        mesh: prepared mesh; its number of pairs and its floating-point type count, nothing else.
-        torque: on the pinion [N m], an `OperatingPoint`, or a `LoadSpectrum`.
-        manufactured: manufactured gears, which run under every torque; None for nominal ones.
+        mesh: prepared mesh, of which only the number of pairs and the floating-point type are used.
+        torque: torque on the pinion [N m], an `OperatingPoint`, or a `LoadSpectrum`.
+        manufactured: manufactured gears, evaluated under every torque; None for nominal gears.
 
     Raises:
         ValueError: for a negative torque, and for lead deviations on a mesh of one slice.

@@ -1,7 +1,7 @@
-"""How the numbers of all cases become one, and how many contact analyses advance side by side.
+"""Measures over all cases, and batches of contact analyses on devices.
 
-A quantile is that of Harrell and Davis everywhere. It follows many values, so that its gradient does too, and of few
-samples it scatters less than the value that happens to stand at the level; of many, both are the same number.
+All quantiles are Harrell-Davis estimates. They depend on many values, and so do their gradients; for few samples they
+scatter less than the value at the level, for many samples both are equal.
 """
 
 from collections.abc import Callable
@@ -29,17 +29,17 @@ def joined(
     weights: Float[Array, " cases"],
     better: Better = "smaller",
 ) -> Float[Array, ""]:
-    """One number for the values of many cases, with failed ones, NaN, beyond all others.
+    """Measure of the values of all cases; failed cases, NaN, rank beyond all others.
 
     Args:
-        measure: how they are joined.
-        values: of all cases, shape (cases,).
-        weights: of the cases, shape (cases,).
-        better: which values are the good ones: where large ones are, the worst is the smallest, and the 95 % quantile
-            is what 95 % of the cases exceed.
+        measure: measure over the cases.
+        values: values of all cases, shape (cases,).
+        weights: weights of the cases, shape (cases,).
+        better: direction of improvement; for "larger" the worst value is the smallest, and 95 % of the cases exceed the
+            95 % quantile.
 
     Returns:
-        the number; infinite on the bad side where failed cases have a share in it.
+        the measure, shape (); infinite on the bad side if failed cases contribute to it.
     """
     sign = 1.0 if better == "smaller" else -1.0
     bad = jnp.where(jnp.isfinite(values), sign * values, jnp.inf)
@@ -47,7 +47,7 @@ def joined(
 
 
 def ranked(measure: AbstractMeasure, values: np.ndarray, better: Better = "smaller") -> np.ndarray:
-    """`joined` for many values of equal weight along the first axis, on the host."""
+    """Measure of many values of equal weight over the first axis, computed on the host; see `joined`."""
     count, sign = len(values), 1.0 if better == "smaller" else -1.0
     edges = jnp.arange(count + 1) / count
     shares = np.diff(np.asarray(measure.spread(edges, jnp.asarray(count, edges.dtype)))).astype(values.dtype)
@@ -59,7 +59,7 @@ def ranked(measure: AbstractMeasure, values: np.ndarray, better: Better = "small
 
 
 def label(measure: AbstractMeasure) -> str:
-    """Short name of a measure, as the columns of a table carry it: mean, worst, q95, cvar95."""
+    """Short name of a measure for columns of tables: mean, worst, q95, cvar95."""
     match measure:
         case Quantile():
             return f"q{100 * float(measure.level):g}"
@@ -71,7 +71,7 @@ def label(measure: AbstractMeasure) -> str:
 
 
 def in_words(measure: AbstractMeasure) -> str:
-    """The measure before the name of what it measures: "mean", "95 % quantile of"."""
+    """Measure as a prefix of the name of a quantity: "mean", "95 % quantile of"."""
     match measure:
         case Quantile():
             return f"{100 * float(measure.level):g} % quantile of"
@@ -88,7 +88,7 @@ _AXIS = "designs"
 
 
 def side_by_side(mesh: Mesh, cases: int = 1) -> int:
-    """Designs of so many cases that advance side by side on a device, whatever the number of devices."""
+    """Number of designs per batch on one device, for designs with a number of cases."""
     size, platform = mesh.resolution, jax.local_devices()[0].platform
     points = size.positions * size.slices * cases
     designs = max(_SIDE_BY_SIDE.get(platform, _SIDE_BY_SIDE_ELSEWHERE) // points, 1)
@@ -96,9 +96,9 @@ def side_by_side(mesh: Mesh, cases: int = 1) -> int:
 
 
 def padded(rows: Numbers, multiple: int) -> np.ndarray:
-    """Rows repeated at the end up to a multiple.
+    """Rows padded to a multiple of a number by repeats of the last row.
 
-    Whole batches only: a rest would be a program of its own, compiled for the length of the contact solution.
+    Only whole batches are evaluated: a shorter batch would need another compilation.
     """
     rows = np.asarray(rows)
     return np.concatenate([rows, np.repeat(rows[-1:], -len(rows) % multiple, axis=0)])
@@ -110,26 +110,26 @@ def local_devices() -> DeviceMesh:
 
 
 def everywhere(tree: Tree, devices: DeviceMesh) -> Tree:
-    """Arrays copied to all devices, once and not per call."""
+    """Arrays copied to all devices once."""
     return jax.device_put(tree, NamedSharding(devices, PartitionSpec()))
 
 
 def divided(rows: Tree, devices: DeviceMesh) -> Tree:
-    """Rows shared out among the devices; their number is a multiple of the number of devices."""
+    """Rows distributed to the devices; their number must be a multiple of the number of devices."""
     return jax.device_put(rows, NamedSharding(devices, PartitionSpec(_AXIS)))
 
 
 def over_devices(
     function: Callable[[Shared, Tree], Result], rows: Tree, shared: Shared, *, batch: int | None, devices: DeviceMesh
 ) -> Result:
-    """function(shared, row) of every row, rows leading: each device takes its share, `batch` rows side by side.
+    """Values of function(shared, row) for every row, leading axis (rows,), distributed to the devices.
 
     Args:
-        function: traceable.
-        rows: array or tree of arrays with as many leading entries, a multiple of batch and number of devices.
-        shared: arrays that every device holds.
-        batch: rows side by side on a device; None for one after the other, each of which may be a batch itself.
-        devices: as `local_devices` gives them.
+        function: traceable function.
+        rows: array or tree of arrays with a leading axis (rows,), a multiple of batch and number of devices.
+        shared: arrays copied to every device.
+        batch: number of rows per batch on a device; None for rows in sequence, each of which may be a batch itself.
+        devices: devices from `local_devices`.
     """
     split, same = PartitionSpec(_AXIS), PartitionSpec()
 

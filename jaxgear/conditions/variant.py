@@ -1,4 +1,4 @@
-"""From the variables of a problem to what is solved: the mesh, the loads and both modifications."""
+"""Build mesh, loads and modifications from the values of the variables of a problem."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
@@ -31,13 +31,13 @@ Result = TypeVar("Result")
 
 
 class Variant(NamedTuple):
-    """One design with its mesh and its loads.
+    """One design with its mesh and loads.
 
     Attributes:
         mesh: prepared mesh.
-        cases: loads and manufactured gears on it.
+        cases: loads and manufactured gears on the mesh.
         pinion, wheel: modifications.
-        status: `Status.OUT_OF_VALIDITY` where a number that the variables made is out of the range of its field.
+        status: `Status.OUT_OF_VALIDITY` if a number computed from the variables is out of the range of its field.
     """
 
     mesh: Mesh
@@ -54,13 +54,13 @@ class Variants(Checked):
     function), the load (a `torque` that is one). Anything else is the same for all variants and is computed once.
 
     Attributes:
-        names: of the variables.
-        design: makes (pinion, wheel) modifications from the named variables.
+        names: names of the variables.
+        design: function that returns (pinion, wheel) modifications from the named variables.
         mesh: prepared mesh, or a function that prepares one from the named variables.
-        torque: on the pinion [N m], or an `OperatingPoint`, as a function of the named variables; None where the
-            conditions say it.
-        conditions: loads and manufactured gears; its load counts where `torque` is None.
-        cases: the conditions on a mesh that is the same for all variants, else None.
+        torque: function of the named variables that returns a torque on the pinion [N m] or an `OperatingPoint`; None
+            for the load of the conditions.
+        conditions: loads and manufactured gears; its load is used if `torque` is None.
+        cases: cases on a mesh common to all variants, else None.
     """
 
     names: tuple[str, ...] = eqx.field(static=True)
@@ -71,7 +71,7 @@ class Variants(Checked):
     cases: Cases | None
 
     def __call__(self, values: Iterable) -> Variant:
-        """The variant of some values of the variables, in the order of their names; traceable."""
+        """Variant for values of the variables, in the order of their names; traceable."""
         parameters = dict(zip(self.names, values))
         pinion, wheel = two_modifications(call_with("design", self.design, parameters))
         mesh, cases = self.mesh, self.cases
@@ -93,17 +93,17 @@ class Variants(Checked):
         return Variant(mesh, cases, pinion, wheel, status_of({Status.OUT_OF_VALIDITY: ~possible}))
 
     def mesh_shape(self, values: Iterable) -> Mesh:
-        """The mesh, or one of shapes where every variant has its own."""
+        """Mesh common to all variants, or the shapes of the mesh if every variant has its own."""
         if isinstance(self.mesh, Mesh):
             return self.mesh
         parameters = dict(zip(self.names, map(real, values)))
         return eqx.filter_eval_shape(partial(call_with, "mesh", self.mesh), parameters)
 
     def traced(self, values: Iterable) -> ClosedJaxpr:
-        """Jaxpr of all that the variables make, as an identity of the functions.
+        """Jaxpr of mesh, load and modifications as functions of the variables, to identify the functions.
 
         Raises:
-            ValueError: for variables on which nothing depends.
+            ValueError: for variables without effect.
         """
 
         def made(values, mesh):
@@ -140,12 +140,12 @@ def variants(
         torque: on the pinion [N m], an `OperatingPoint` or a `LoadSpectrum`; or a function of the named variables that
             gives a torque or an operating point.
         design: makes (pinion, wheel) modifications from the named variables.
-        names: of the variables.
-        values: of the variables of one variant, by which the functions are tried.
+        names: names of the variables.
+        values: example values of the variables, with which the functions are checked.
         manufactured: manufactured gears, see `conditions`.
 
     Raises:
-        ValueError: for whatever the functions and `conditions` refuse.
+        ValueError: for all errors of the functions and of `conditions`.
     """
     parameters = {name: real(value) for name, value in zip(names, values)}
     # shapes only: the example may be a variant that cannot be
@@ -173,8 +173,8 @@ def call_with(name: str, function: Callable[[Parameters], Result], parameters: P
         parameters: values by the names of the variables.
 
     Raises:
-        ValueError: where it asks for a variable that does not exist.
-        TypeError: where it needs the value of a traced number.
+        ValueError: if it uses a variable that does not exist.
+        TypeError: if it needs the value of a traced number.
     """
     try:
         return function(parameters)
@@ -215,14 +215,14 @@ def solve_case(
     wheel: AbstractModification | None = None,
     deviation: Array | float | None = None,
 ) -> MeshCycle:
-    """The cycle of a design by the compiled program that serves every kind of modification.
+    """Mesh cycle of a design, by one compiled program for all kinds of modifications.
 
     Args:
         mesh: prepared mesh.
-        torque: on the pinion [N m], scalar; or an `OperatingPoint`.
+        torque: torque on the pinion [N m], shape (); or an `OperatingPoint`.
         pinion, wheel: modifications; None for nominal involutes.
-        deviation: material that manufacturing deviations remove besides [um], shape (pairs, slices, positions), or a
-            scalar; None for nominal gears.
+        deviation: material removed by manufacturing deviations [um], in addition to the modifications, shape (pairs,
+            slices, positions) or (); None for nominal gears.
     """
     pinion, wheel = pinion or NoModification(), wheel or NoModification()
     removed = removed_material(mesh, torque, pinion=pinion, wheel=wheel)
@@ -239,7 +239,7 @@ def cycle_status(cycle: MeshCycle) -> Statuses:
 
 
 def solved(cycle: MeshCycle) -> Bool[Array, "*cycles"]:
-    """Whether `cycle_status` is `Status.CONVERGED`."""
+    """True if `cycle_status` is `Status.CONVERGED`."""
     return _converged(cycle_status(cycle))
 
 

@@ -1,4 +1,4 @@
-"""Identification: the values of variables that gave a measured transmission error, and how well it tells them.
+"""Identification: values of variables from a measured transmission error, with their uncertainty.
 
 The public names are listed in `__init__.pyi` and imported when they are asked for. The command `identify` is named in
 `application.toml`.

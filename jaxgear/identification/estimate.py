@@ -47,25 +47,27 @@ class Identified(Checked):
     """Estimates of the unknowns from data and prior, with their uncertainty.
 
     Attributes:
-        names: of the unknowns; those of the design, "torque_scale" and "offset" where they are unknown, then single
-            pitch deviations, "pinion_pitch_0" ..., of which one less per gear is independent.
-        own: how many of them, the first, are not pitch deviations.
-        estimate: their most probable values, in their units.
-        deviation: standard deviations, that of the error of the model included.
-        correlation: of the unknowns, shape (unknowns, unknowns).
+        names: names of the unknowns: those of the design, "torque_scale" and "offset" if unknown, then single pitch
+            deviations, "pinion_pitch_0" ..., of which one fewer than the teeth of each gear is independent.
+        own: number of unknowns before the pitch deviations.
+        estimate: most probable values of the unknowns, in their units, shape (unknowns,).
+        deviation: standard deviations of the unknowns, error of the model included, shape (unknowns,).
+        correlation: correlation matrix of the unknowns, shape (unknowns, unknowns).
         prior: mean and standard deviation before the data, shape (2, unknowns).
-        singular_values: of the Jacobian, rows divided by noise and error of the model, columns in prior standard
-            deviations; descending. Below 1 the prior says more than the data.
-        directions: the right singular vectors, a row for each.
-        torque, phase: of the readings as joined per position.
-        measured, fitted: transmission error of these.
-        noise: standard deviation of these.
-        model_error: standard deviation of the mean that the model misses at the largest torque.
-        chi_square: weighted square of the residual by noise alone, per degree of freedom; about 1 where the model is
-            as good as the data.
-        converged: whether the steps ended and all contact solutions converged.
-        candidates: further torques, shape (candidates,).
-        told_by_candidates: singular values of the data together with each of them, shape (candidates, independent).
+        singular_values: singular values of the Jacobian in descending order, with rows divided by noise and error of
+            the model and columns in prior standard deviations. Below 1 the prior determines more than the data.
+        directions: right singular vectors, one per row.
+        torque, phase: torque [N m] and phase [base pitches] of the readings averaged per position.
+        measured, fitted: measured and fitted transmission error of these readings [um].
+        noise: standard deviation of these readings [um].
+        model_error: standard deviation of the error of the mean transmission error by the model at the largest torque
+            [um].
+        chi_square: square of the residual weighted by noise alone, per degree of freedom; about 1 if the model is as
+            accurate as the data.
+        converged: True if the steps have converged and all contact solutions have converged.
+        candidates: further torques [N m], shape (candidates,).
+        told_by_candidates: singular values of the data together with each further torque, shape (candidates,
+            independent unknowns).
     """
 
     names: tuple[str, ...] = eqx.field(static=True)
@@ -89,17 +91,18 @@ class Identified(Checked):
 
     @property
     def best_candidate(self) -> float | None:
-        """The further torque that tells most of what is told least [N m]; None without candidates."""
+        """Further torque with the most information on the least determined combination [N m]; None without candidates.
+        """
         least = np.asarray(self.told_by_candidates)[:, -1:]
         return float(self.candidates[int(np.argmax(least))]) if len(least) else None
 
     @property
     def parameters(self) -> dict[str, Scalar]:
-        """The estimates by name but for pitch deviations, which the design takes."""
+        """Estimates by name without pitch deviations, the arguments of the design."""
         return dict(zip(self.names, self.estimate[: self.own]))
 
     def not_told(self) -> list[str]:
-        """Combinations of unknowns that the prior determines more than the data, a line for each."""
+        """Lines on combinations of unknowns that the prior determines more than the data."""
         lines, values, directions = [], np.asarray(self.singular_values), np.asarray(self.directions)
         of_pitch = np.sum(directions[:, self.own :] ** 2, axis=1) > _CHIEFLY
         for value, direction in zip(values[~of_pitch], directions[~of_pitch]):
@@ -120,7 +123,7 @@ class Identified(Checked):
 
     @property
     def single_pitch(self) -> dict[GearName, tuple[Vector, Vector]]:
-        """Single pitch deviations and their standard deviations, where they were unknown, by gear [um]."""
+        """Single pitch deviations and their standard deviations [um] by gear, for gears with unknown pitches."""
         found = {}
         for gear in GEARS:
             at = np.array([place for place, name in enumerate(self.names[self.own :]) if name.startswith(gear)], int)
@@ -135,9 +138,9 @@ class Identified(Checked):
 
     @property
     def residual_orders(self) -> Float[np.ndarray, "torques orders"]:
-        """Amplitudes of the mesh orders 1, 2 ... of what the fit leaves, a row per torque [um].
+        """Amplitudes of the mesh orders 1, 2 ... of the residual of the fit [um], shape (torques, orders).
 
-        By least squares; as many orders as the readings of every torque resolve, 8 at most.
+        They are least-squares estimates; the readings of every torque limit the number of orders, 8 at most.
         """
         every, left = self._rows_of_torques(), np.asarray(self.measured - self.fitted)
         places = min(len(np.unique(np.round(np.asarray(self.phase)[rows] % 1, _SAME))) for rows in every)
@@ -152,7 +155,8 @@ class Identified(Checked):
 
     @property
     def noise_orders(self) -> Float[np.ndarray, " torques"]:
-        """Amplitude of a mesh order that noise alone stays below in 95 of 100 cases, of every torque [um]."""
+        """95 % quantile of the amplitude of a mesh order due to noise alone, for every torque [um], shape (torques,).
+        """
         mean = [
             np.sqrt(np.mean(np.square(np.asarray(self.noise)[rows])) / len(rows)) for rows in self._rows_of_torques()
         ]
@@ -323,33 +327,34 @@ def identify(
     candidates: Sequence[float] = (),
     steps: int = 50,
 ) -> Identified:
-    """The unknowns of a design that gave a measured transmission error.
+    """Identify the unknowns of a design from a measured transmission error.
 
-    Most probable values under Gaussian priors and noise, by Gauss-Newton steps with exact derivatives through the
-    contact solution. The model has an error of its own: smooth curves over the phase, proportional to the torque,
-    partly alike at all torques. Their size is that of `model_error` and, added in squares, a mean over those under
-    which the data are probable; it widens the standard deviations (M. C. Kennedy, A. O'Hagan, Bayesian calibration of
-    computer models, J. R. Stat. Soc. B 63, 2001).
+    The result is the most probable value of each unknown under Gaussian priors and noise, by Gauss-Newton steps with
+    exact derivatives through the contact solution. The model has an error: smooth curves over the phase, proportional
+    to the torque, partly equal for all torques. Its size combines `model_error` and, added in squares, a mean over
+    sizes weighted by the probability of the data; it widens the standard deviations (M. C. Kennedy, A. O'Hagan,
+    Bayesian calibration of computer models, J. R. Stat. Soc. B 63, 2001).
 
     Args:
         mesh: prepared mesh.
         measurement: measured transmission error.
-        design: makes (pinion, wheel) modifications from the named unknowns.
-        prior: mean and standard deviation of every unknown in its unit, such as that of the tolerance class.
-        torque_scale: standard deviation of the factor between measured and true torque; None for a right one.
-        offset: standard deviation of what is added to every reading [um]; None for absolute readings.
-        single_pitch: standard deviations of the single pitch deviations of pinion and wheel, see `TeethDeviations`
-            [um]; None for equal teeth, of one gear or both. Readings are then those of teeth that differ, and `offset`
-            must be unknown. Which teeth they are the mesh position says: pair n is tooth n mod z1 on tooth n mod z2.
-        model_error: standard deviation of the error of the mean deflection, relative to it; 0.02 is that of the default
-            structure against finite elements. What the residual shows comes on top.
+        design: function that returns (pinion, wheel) modifications from the named unknowns.
+        prior: mean and standard deviation of every unknown in its unit, for instance from the tolerance class.
+        torque_scale: standard deviation of the ratio of true to measured torque; None for an exact torque.
+        offset: standard deviation of an offset added to every reading [um]; None for absolute readings.
+        single_pitch: standard deviations of the single pitch deviations of pinion and wheel [um], see
+            `TeethDeviations`; None for equal teeth of one gear or both. With pitch deviations, `offset` must be
+            unknown, and the mesh position of a reading identifies the teeth: pair n is tooth n mod z1 on tooth n mod
+            z2.
+        model_error: relative standard deviation of the error of the mean deflection; 0.02 is the error of the default
+            structure against finite elements. An error visible in the residual is added.
         candidates: further torques that could be measured [N m].
-        steps: of the search.
+        steps: largest number of steps.
 
     Raises:
-        ValueError: for a prior that is not positive, an unknown on which nothing depends, or no noise without repeats,
-            or pitch deviations without an offset.
-        TypeError: for something else than a prepared mesh.
+        ValueError: for a prior that is not positive, an unknown without effect, no noise without repeated readings, or
+            pitch deviations without an offset.
+        TypeError: if the mesh is not a prepared mesh.
     """
     check("model_error", model_error, "", low=0.0, high=1.0)
     whole("steps", steps, low=1)
@@ -406,7 +411,7 @@ def _posed(
 
 
 def period_of(measurement: Measurement, pair: GearPair, single_pitch: Pitches | None, offset: float | None) -> int:
-    """Base pitches after which the same teeth meet, of those whose pitch deviations are unknown; 1 for equal teeth.
+    """Number of base pitches after which teeth with unknown pitch deviations meet again; 1 for equal teeth.
 
     Raises:
         ValueError: for standard deviations that are not positive, no unknown offset, or readings of one base pitch.

@@ -24,23 +24,23 @@ _MOST_STRESS = 500.0  # tangential force over face width and module [MPa]: sever
 
 
 def read_measurement(path: str | Path, pair: GearPair, *, noise: float | None = None) -> Measurement:
-    """Reads a measured transmission error.
+    """Read a measured transmission error from a file.
 
-    Columns are `torque_Nm`, `te_um`, and `phase` in base pitches or `angle_deg` of the pinion; `revolution` of the
-    pinion, which counts where these begin anew with each, and `repeat` may be there too. Whatever was read at one
-    torque and mesh position is joined, its scatter is the noise.
+    Required columns are `torque_Nm`, `te_um`, and `phase` in base pitches or `angle_deg` of the pinion. Optional
+    columns are `repeat`, and `revolution` of the pinion for phases or angles that restart with every revolution.
+    Readings at one torque and mesh position are averaged; their scatter is the noise.
 
-    Other units stand at the end of a heading, `te_mm` or `TE [mm]`. A transmission error that is an angle says of which
-    shaft: `te_wheel_arcsec`, `te_pinion_deg` or `te_wheel [urad]` is the angle times the base radius of that gear, on
-    the line of action, positive as `te_um` when the wheel lags.
+    Other units are given at the end of a heading, `te_mm` or `TE [mm]`. A transmission error given as an angle names
+    its shaft: `te_wheel_arcsec`, `te_pinion_deg` or `te_wheel [urad]` is the angle that is multiplied by the base
+    radius of that gear, positive like `te_um` when the wheel lags.
 
     Args:
-        path: text in UTF-8, columns apart by commas, semicolons or tabs, or Parquet.
-        pair: gear pair, whose tooth number turns angles into phases, and base radii angles into lengths.
-        noise: standard deviation of a reading [um]; None for that of repeats.
+        path: file, text in UTF-8 with columns separated by commas, semicolons or tabs, or Parquet.
+        pair: gear pair; the number of teeth converts angles to phases, the base radii convert angles to lengths.
+        noise: standard deviation of a reading [um]; None for the scatter of repeated readings.
 
     Raises:
-        DesignFileError: for anything that is wrong with it, in one line that names the file and the column.
+        DesignFileError: for errors in the file, in one line that names the file and the column.
     """
     path = Path(path)
     with naming(path):

@@ -1,4 +1,4 @@
-"""A measured transmission error: its readings joined, their noise, and the error of a model that is fitted to them."""
+"""Measured transmission error: averaged readings, their noise, and the error of the fitted model."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -21,19 +21,18 @@ _LARGEST_GAP = 0.25  # between neighbouring phases of one torque [base pitches]:
 
 
 class Measurement(Checked):
-    """A measured transmission error, a row per reading.
+    """Measured transmission error, one row per reading.
 
     Attributes:
-        phase: mesh position, in which teeth 0 of both gears touch at the pitch point at 0; readings of several base
-            pitches are folded into one, but where teeth differ.
-        torque: on the pinion.
-        transmission_error: along the line of action, positive when the wheel lags.
-        noise: standard deviation of a reading; None for that of repeats, of readings of one torque within one mesh
-            position.
+        phase: mesh position; at 0 the teeth 0 of both gears touch at the pitch point. Readings of several base pitches
+            are folded into one, except for gears with unknown pitch deviations.
+        torque: torque on the pinion.
+        transmission_error: transmission error along the line of action, positive when the wheel lags.
+        noise: standard deviation of a reading; None for the scatter of readings at one torque and mesh position.
 
     Raises:
-        ValueError: for less than 12 readings, columns of different lengths, numbers that are not finite, or phases
-            of a torque that leave more than a quarter of the base pitch out.
+        ValueError: for fewer than 12 readings, columns of different lengths, numbers that are not finite, or a gap of
+            more than a quarter of the base pitch between the phases of a torque.
     """
 
     phase: Rows = number("base pitches", shape=("rows",))
@@ -58,14 +57,14 @@ class Measurement(Checked):
                 )
 
     def noise_on(self, resolution: Resolution, period: int = 1) -> Scalar:
-        """Standard deviation of a reading [um], given or of readings of one torque within one position of the mesh.
+        """Standard deviation of a reading [um], as given or from readings at one torque and mesh position.
 
         Args:
-            resolution: of the mesh.
-            period: base pitches after which the same teeth meet; 1 for equal teeth.
+            resolution: array sizes of the mesh.
+            period: number of base pitches after which the same teeth meet; 1 for equal teeth.
 
         Raises:
-            ValueError: for none that is given and too few repeats, or repeats that are all alike.
+            ValueError: if no noise is given and repeated readings are too few or all equal.
         """
         return noise_of(self, bins_of(self, resolution.positions, float(np.asarray(resolution.first_phase)), period))
 

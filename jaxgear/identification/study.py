@@ -1,4 +1,4 @@
-"""The study of a measured transmission error: which values of the variables of a design file gave it."""
+"""Identification study: values of the variables of a design file from a measured transmission error."""
 
 import tempfile
 from collections.abc import Iterator, Mapping
@@ -58,7 +58,7 @@ class _Flanks(eqx.Module):
 
 @dataclass(frozen=True)
 class IdentificationStudy(AbstractStudy["IdentificationResult"]):
-    """Find the values of the variables that gave a measured transmission error, and how well it tells them.
+    """Find the values of variables from a measured transmission error, with their uncertainty.
 
     The file has the columns torque_Nm, te_um, and phase (base pitches) or angle_deg (of the pinion). An error that is
     an angle names its shaft and unit: te_wheel_arcsec, te_pinion_deg.
@@ -139,11 +139,11 @@ class IdentificationStudy(AbstractStudy["IdentificationResult"]):
         return coarse(size) if self.quick else size
 
     def omits(self) -> str:
-        """Nothing: [tolerance] gives priors."""
+        """Empty message: [tolerance] gives the priors."""
         return ""
 
     def work_out(self, checkpoints: Checkpoints, stages: Stages) -> "IdentificationResult":
-        """The identified variables; keeps no checkpoints."""
+        """Identify the variables; writes no checkpoints."""
         stages.begin("preparing the mesh")
         mesh = self.design.mesh(self._sizes())
         stages.begin("searching the variables")

@@ -1,7 +1,7 @@
 """Pictures of mesh cycles, flanks, many variants, manufactured gears and optimizations, one file per kind.
 
-Every function draws into the Axes `ax`, or into a new figure of report size when `ax` is None, and returns the Axes.
-None shows a window or changes matplotlib's settings; `save` writes the file.
+Every function draws into the Axes `ax`, or into a new figure of report size if `ax` is None, and returns the Axes.
+No function opens a window or changes the settings of matplotlib; `save` writes the file.
 """
 
 from .convergence import convergence as convergence

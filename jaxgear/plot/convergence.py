@@ -33,11 +33,11 @@ from .mesh_cycle import PATH_LABEL, PHASE_LABEL, two_pitches
     "which the search ends."
 )
 def convergence(optima: Mapping[str, Optimum], ax: Axes | None = None) -> Axes:
-    """Best objective met over the contact analyses spent, with a mark at the end of every search.
+    """Best objective over the contact analyses spent, with a mark at the end of every search.
 
-    Where a search ends on a finer mesh, on which its designs are judged anew, what is reached there is a curve of its
-    own, dotted and with an open mark. Both axes are logarithmic, the ordinate only where all objectives are positive.
-    What was known before the first analysis is drawn at one analysis; as long as no design was valid there is no curve.
+    If a search ends on a finer mesh, its objectives on that mesh are a separate dotted curve with an open mark. Both
+    axes are logarithmic, the ordinate only if all objectives are positive. An objective known before the first analysis
+    is drawn at one analysis. The curve begins with the first valid design.
 
     Args:
         optima: results by the name of their method, of the same objective; up to eight differ in style.

@@ -42,14 +42,14 @@ def speed_response(
     *,
     title: str = "",
 ) -> Axes:
-    """A number of the steady states of several designs over the mesh frequency, speed rising and falling.
+    """Dynamic factor or rms of the DTE of several designs over the mesh frequency, for rising and falling speed.
 
     Args:
-        responses: of every design, by its name: those of several runs, by what the legend says of each ("falling,
-            kicked"); in a sequence each has its direction. Run-ups, which have no rms, go with them or alone.
-        of: which number: the dynamic factor or the rms of the DTE about its mean.
+        responses: runs by the name of the design: speed responses by their text in the legend ("falling, kicked"), or a
+            sequence of them, labelled by their directions. Run-ups, which have no rms, may be added or drawn alone.
+        of: quantity: the dynamic factor or the rms of the DTE about its mean.
         ax: Axes to draw into; None for a new figure.
-        title: over the Axes and the legend.
+        title: title above the Axes and the legend.
     """
     seen: dict[str, Any] = {}
     with report_axes(ax) as ax:
@@ -170,11 +170,11 @@ def order_tracks(
 
 
 def speed_scale(ax: Axes, teeth: float) -> None:
-    """A second scale below Axes over the mesh frequency: the speed of the pinion.
+    """Add a second scale below the Axes for the speed of the pinion [rpm].
 
     Args:
-        ax: the Axes.
-        teeth: of the pinion.
+        ax: Axes over the mesh frequency [Hz].
+        teeth: number of teeth of the pinion.
     """
     per_hertz = 60 / teeth
     scale = ax.secondary_xaxis("bottom", functions=(lambda at: at * per_hertz, lambda speed: speed / per_hertz))
@@ -275,15 +275,15 @@ def phase_portrait(
     once: tuple[ArrayLike, ArrayLike] | None = None,
     title: str = "",
 ) -> Axes:
-    """An orbit in the plane of DTE and velocity, coloured by what is in contact.
+    """Phase portrait: an orbit in the plane of DTE and velocity, coloured by drive contact, no contact, coast contact.
 
     Args:
-        dte: of the flanks at equal steps of one period [um], shape (steps,).
-        velocity: of DTE [um/s], shape (steps,).
-        force: of the mesh [N], shape (steps,): positive on the drive flanks, negative on the coast flanks.
-        once: (dte, velocity) once per mesh cycle, each of shape (points,); None for no marks.
+        dte: DTE of the flanks at equal steps of one period [um], shape (steps,).
+        velocity: velocity of the DTE [um/s], shape (steps,).
+        force: mesh force [N], shape (steps,): positive on the drive flanks, negative on the coast flanks.
+        once: DTE [um] and velocity [um/s] once per mesh cycle, each of shape (points,); None for no marks.
         ax: Axes to draw into; None for a new figure.
-        title: over the Axes and the legend.
+        title: title above the Axes and the legend.
     """
     x, y, f = np.asarray(dte), 1e-3 * np.asarray(velocity), np.asarray(force)
     closed = np.stack([np.append(x, x[0]), np.append(y, y[0])], axis=1)
@@ -309,7 +309,7 @@ def phase_portrait(
 
 
 def _entitle(ax: Axes, title: str, lines: int) -> None:
-    """A title over a legend of so many lines."""
+    """Add a title above a legend with a number of lines."""
     if title:
         ax.set_title(title, loc="left", pad=_PAD + _LINE * lines, fontsize=ax.xaxis.label.get_fontsize())
 

@@ -71,7 +71,7 @@ APART = (1, 3, 4, 5, 2, 6, 7)
 
 
 def captioned(caption: str) -> Callable[[_Drawn], _Drawn]:
-    """Gives a plot function the caption of its figures in reports, as its attribute `caption`."""
+    """Decorator that sets the caption of a plot function for reports, as its attribute `caption`."""
 
     def mark(draw: _Drawn) -> _Drawn:
         setattr(draw, "caption", caption)  # noqa: B010 - a function has no such attribute for type checkers
@@ -82,10 +82,11 @@ def captioned(caption: str) -> Callable[[_Drawn], _Drawn]:
 
 @contextmanager
 def same_styles(numbers: Mapping[str, int]) -> Iterator[None]:
-    """In the `with` block a design has the same colour and line style in every figure.
+    """Context in which a design has the same colour and line style in every figure.
 
     Args:
-        numbers: of the styles, as `line_style` takes them, by the name of the design. Others go by their place.
+        numbers: index of the style, as for `line_style`, by the name of the design. Designs without an index get the
+            style of their position in the figure.
     """
     before = _NUMBERS.set(MappingProxyType(dict(numbers)))
     try:
@@ -95,18 +96,18 @@ def same_styles(numbers: Mapping[str, int]) -> Iterator[None]:
 
 
 def style_number(name: str, place: int) -> int:
-    """Number of the style of a design: that of `same_styles`, or else its place."""
+    """Index of the style of a design: from `same_styles`, or else its position in the figure."""
     return _NUMBERS.get().get(name, place)
 
 
 def styled(designs: Mapping[str, _Drawn]) -> Iterator[tuple[int, str, _Drawn]]:
-    """Number of its style, name and what is drawn, of every design."""
+    """Index of the style, name and drawn object of every design."""
     for place, (name, drawn) in enumerate(designs.items()):
         yield style_number(name, place), name, drawn
 
 
 def line_style(index: int) -> dict[str, Any]:
-    """Colour, dashes and width of the curve with this number."""
+    """Colour, dashes and line width of a style, by its index."""
     return {"color": _COLOURS[index % len(_COLOURS)], "linestyle": _DASHES[index % len(_DASHES)], "linewidth": 1.4}
 
 
@@ -143,7 +144,7 @@ def wrapped(text: str, room: int = _LINE) -> str:
 def report_axes(
     ax: Axes | Panels | None, *, columns: int = 1, rows: int = 1, width: float = WIDTH, height: float = HEIGHT
 ) -> Iterator[Axes]:
-    """The given Axes as they are, or new ones in report style; the style is off again after the `with` block.
+    """Context with the given Axes, or with new Axes in report style.
 
     Args:
         ax: Axes, an array of them for several panels, or None.
@@ -198,11 +199,11 @@ def report_figure(width: float, height: float) -> Iterator[Figure]:
 
 
 def emphasize(figure: Figure, name: str) -> None:
-    """Makes the lines of one design the boldest of a figure: wide, before all others.
+    """Emphasize the lines of one design in a figure: wider, and in front of all others.
 
     Args:
-        figure: with one line per design.
-        name: of the design; labels may go on behind it in brackets. A figure without it stays as it is.
+        figure: figure with one line per design.
+        name: name of the design; labels may continue in brackets. A figure without the design is not changed.
     """
     legends = [*figure.legends, *(ax.get_legend() for ax in figure.axes if ax.get_legend() is not None)]
     marks = [mark for legend in legends for mark in zip(legend.get_texts(), legend.legend_handles)]
@@ -277,7 +278,7 @@ def legend_over_panels(figure: Figure, panel: Axes) -> int:
 
 
 def grow(ax: Axes, lines: int) -> None:
-    """Makes a new figure higher by the lines of a long legend, which would else take their room from the Axes."""
+    """Increase the height of a new figure by the lines of a legend, so that the Axes keep their size."""
     figure = _root(ax)
     figure.set_figheight(figure.get_figheight() + lines * _LEGEND_LINE / _POINTS_PER_INCH)
 
@@ -309,13 +310,13 @@ def _root(ax: Axes) -> Figure:
 
 
 def colour_bar(image: ScalarMappable, ax: Axes | Panels, label: str, **options: float | str) -> None:
-    """A scale of the colours beside Axes, with the letters of its own like theirs.
+    """Add a colour bar next to Axes, with the font size of the Axes.
 
     Args:
-        image: what is coloured.
+        image: coloured artist.
         ax: Axes, or panels side by side.
-        label: of the scale.
-        options: of matplotlib's colour bar, such as its distance `pad`.
+        label: label of the colour bar.
+        options: options of the colour bar of matplotlib, such as its distance `pad`.
     """
     panels = np.atleast_1d(ax)
     bar = panels[0].figure.colorbar(image, ax=list(panels), **options)

@@ -62,7 +62,7 @@ def flank_panels(
     about: str | None = None,
     band: Band | None = None,
 ) -> np.ndarray:
-    """The two Axes: material removed goes down, and the nominal involute is the zero line.
+    """Draw flanks of pinion and wheel into two Axes: material removed points down, the nominal involute is zero.
 
     Args:
         mesh: prepared mesh.
@@ -212,8 +212,8 @@ def k_chart(
 ) -> np.ndarray:
     """Material removed from pinion and wheel [um] over the roll angle [deg], in the middle of the face.
 
-    From the start of the active profile to the tip; the nominal involute is the zero line, material removed goes down
-    as on the print of a gear measuring machine. The upper axis is the diameter [mm].
+    The chart extends from the start of the active profile to the tip. The nominal involute is the zero line; material
+    removed points down as in reports of gear measuring machines. The upper axis is the diameter [mm].
 
     Args:
         mesh: prepared mesh.
@@ -388,8 +388,8 @@ def _draw(ax: Axes, along: np.ndarray, face: np.ndarray, flank: np.ndarray, most
 def line_load(cycle: MeshCycle, ax: Axes | None = None, *, position: int | None = None) -> Axes:
     """Line load [N/mm] of every loaded pair over the face at one mesh position, the mean over the face beside it.
 
-    Of helical gears, whose pairs lie in part of the face only, that of all pairs together is drawn too, and the mean is
-    its.
+    For helical gears, whose pairs cover only a part of the face, the sum of all pairs is drawn too; the mean refers to
+    this sum.
 
     Args:
         cycle: solved cycle of several slices.
@@ -421,10 +421,10 @@ def face_gap(cycle: MeshCycle, mesh: Mesh, ax: Axes | None = None, *, position: 
     """Gap [um] between the flanks of the pair with the largest force over the face at one mesh position, unloaded and
     under load.
 
-    Unloaded it is that of modifications, misalignment and other meshes on the shafts, from where the flanks touch
-    first; of helical gears where the pair is on the path of contact; on bent shafts the same with what the load of this
-    mesh makes of shafts, bearings and housing, where they deflect; under load what is left where the flanks do not
-    touch.
+    The unloaded gap is due to modifications, misalignment and other meshes on the shafts, measured from the first point
+    of contact; for helical gears it is drawn where the pair is on the path of contact. With elastic supports a further
+    curve adds the deflection of shafts, bearings and housing under the load of this mesh. The loaded gap is the
+    remaining gap outside the contact.
 
     Args:
         cycle: solved cycle of several slices.

@@ -51,7 +51,7 @@ def objective_labels(problem: Problem | None) -> list[str]:
 
 
 def best_label(optimum: Optimum) -> str:
-    """Label of what a search has made small; of several objectives it is the distance from the ideal."""
+    """Label of the objective of a search; for several objectives of the distance from the ideal."""
     labels = objective_labels(optimum.problem)
     return labels[0] if len(labels) == 1 else "distance from the ideal [-]"
 
@@ -79,9 +79,9 @@ _HEXAGONS = 60  # across
 
 @captioned("Results of the variants against each other, with the Pareto front.")
 def pareto(table: Table[Of], ax: Axes | None = None, *, marked: Mapping[str, int] | None = None) -> Axes:
-    """Variants that no other one beats in two results, or in three with the third as colour, over all the others.
+    """Pareto front of variants in two results, or in three with the third as colour, and all other variants.
 
-    All others are a faint cloud: dots, or hexagons that count them on a logarithmic grey scale when there are many.
+    The other variants are dots, or for large numbers hexagons that count them on a logarithmic grey scale.
     Variants that are not finite in a result are counted as failed and not drawn.
 
     Args:
@@ -128,13 +128,13 @@ def _cloud(ax: Axes, others: np.ndarray, text: str) -> None:
 
 
 def front_steps(ax: Axes, best: np.ndarray, text: str, *, where: Literal["pre", "post"] = "post") -> None:
-    """The border of what is beaten: from every design of the front straight on to where the next one takes over.
+    """Draw the border of the dominated region as steps between the designs of the front.
 
     Args:
         ax: Axes to draw into.
-        best: the front, ascending in the first column.
-        text: its label.
-        where: "post" where the first column is to be small, "pre" where it is to be large.
+        best: front in ascending order of the first column, shape (designs, columns).
+        text: label of the front.
+        where: "post" if smaller values of the first column are better, "pre" if larger values are better.
     """
     style = line_style(1)
     ax.step(*best[:, :2].T, where=where, color=style["color"], linewidth=1.0)
@@ -142,7 +142,7 @@ def front_steps(ax: Axes, best: np.ndarray, text: str, *, where: Literal["pre", 
 
 
 def front_dots(ax: Axes, best: np.ndarray, text: str, bar_text: str, *, turned: bool = False) -> None:
-    """A front of three with the third column as colour; `turned` where large values are the better ones."""
+    """Draw a front of three columns with the third as colour; `turned` is True if its larger values are better."""
     image = ax.scatter(
         *best[:, :2].T,
         c=best[:, 2],
@@ -157,7 +157,7 @@ def front_dots(ax: Axes, best: np.ndarray, text: str, bar_text: str, *, turned: 
 
 
 def front_star(ax: Axes, values: np.ndarray, text: str, index: int = 0) -> None:
-    """A star at a design that is pointed out."""
+    """Draw a star at a marked design."""
     style = {"color": line_style(index + 2)["color"], "markeredgecolor": "white"}
     ax.plot(*values[:2], marker="*", markersize=11, linestyle="", label=text, zorder=5, **style)
 
@@ -173,7 +173,7 @@ def optimum_front(
     *,
     others: Mapping[str, ArrayLike] | None = None,
 ) -> Axes:
-    """Designs of which none is better in both objectives; of more objectives the first two, with the third as colour.
+    """Pareto front of an optimization in its first two objectives, with a third objective as colour.
 
     Args:
         front: result of an optimization of several objectives.

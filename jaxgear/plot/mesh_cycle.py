@@ -33,8 +33,8 @@ def path_label(cycles: Iterable[MeshCycle]) -> str:
 def pair_history(cycle: MeshCycle, values: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
     """Path positions and values of one pair from first to last contact.
 
-    All pairs are alike and follow each other at one base pitch, so the pairs of a cycle, put in the order of their path
-    positions, are the stages of one pair.
+    All pairs are equal and follow each other at a distance of one base pitch: the pairs of a cycle, sorted by path
+    position, are the history of one pair.
 
     Args:
         cycle: solved mesh cycle.

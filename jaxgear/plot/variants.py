@@ -59,7 +59,7 @@ def columns_of(table: Table[Of], *, least: int = 1) -> np.ndarray:
 
 
 def costs(values: np.ndarray, columns: Iterable[Of]) -> np.ndarray:
-    """The columns with their signs turned so that smaller is better in each."""
+    """Values with the sign of every column changed so that smaller is better, shape (variants, columns)."""
     return values * np.array([float(of.sign) for of in columns])
 
 
@@ -76,7 +76,7 @@ def subsample(rows: np.ndarray, count: int) -> np.ndarray:
 
 
 def share_text(shown: int, total: int, failed: int = 0) -> str:
-    """How many variants a picture shows of how many, and how many failed."""
+    """Text with the numbers of shown, total and failed variants."""
     text = f"{total:,} variants" if shown >= total else f"{shown:,} of {total:,} variants"
     return text.replace(",", "\u2009") + (f", {failed} failed" if failed else "")
 

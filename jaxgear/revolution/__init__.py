@@ -1,4 +1,4 @@
-"""Every tooth on its own: contact over whole revolutions of gears whose teeth differ."""
+"""Contact over whole revolutions of gears with deviations of single teeth."""
 
 from .orders import NamedOrder as NamedOrder
 from .orders import named_orders as named_orders

@@ -1,4 +1,4 @@
-"""Results of a revolution: orders of the shafts, composite errors, the load on every tooth.
+"""Results of a revolution: shaft orders, composite deviations, load share of every tooth.
 
 References:
     ISO 1328-1:1995 on the tangential composite deviation F'_i, the range over a whole revolution, and the
@@ -32,10 +32,10 @@ def shaft_orders(
     The mesh order is the number of teeth of the gear, its multiples are the mesh harmonics.
 
     Args:
-        revolution: of whole revolutions of all gears whose teeth differ, and of this one.
-        gear: on the shaft, "pinion" or "wheel".
-        count: number of orders; None for those up to three and a half mesh orders, or all that the positions resolve.
-        of: another curve over the places of the revolution; None for the loaded transmission error.
+        revolution: revolution over whole revolutions of this gear and of all gears with deviations of single teeth.
+        gear: gear on the shaft, "pinion" or "wheel".
+        count: number of orders; None for orders up to three and a half mesh orders, or all that the positions resolve.
+        of: another curve over the places of the revolution, shape (places,); None for the loaded transmission error.
 
     Raises:
         ValueError: for other revolutions or gears, and for more orders than the positions resolve.
@@ -57,12 +57,12 @@ def shaft_orders(
 def side_bands(
     revolution: Revolution, gear: GearName, harmonic: int = 1, *, count: int = _SIDE_BANDS
 ) -> Float[Array, "*batch bands"]:
-    """Amplitudes of the orders harmonic * z - count ... harmonic * z + count of a shaft but for the mesh order itself.
+    """Amplitudes of the side bands of a mesh harmonic [um], shape (2 count,): orders harmonic z -+ 1 ... -+ count.
 
     Args:
         revolution, gear: as for `shaft_orders`.
-        harmonic: of the mesh order.
-        count: side bands on either side, less than half of the teeth.
+        harmonic: number of the mesh harmonic.
+        count: number of side bands on either side, less than half of the number of teeth.
 
     Raises:
         ValueError: as `shaft_orders`, and for more side bands.
@@ -73,7 +73,7 @@ def side_bands(
 
 
 def side_band_orders(revolution: Revolution, gear: GearName, harmonic: int = 1, count: int = _SIDE_BANDS) -> list[int]:
-    """The orders of `side_bands`, ascending."""
+    """Shaft orders of `side_bands` in ascending order."""
     whole_revolutions(revolution, gear)
     teeth = revolution.teeth[GEARS.index(gear)]
     whole("count", count, high=(teeth - 1) // 2)
@@ -82,13 +82,13 @@ def side_band_orders(revolution: Revolution, gear: GearName, harmonic: int = 1, 
 
 
 class NamedOrder(NamedTuple):
-    """A line of the spectrum with what it comes from.
+    """Line of the spectrum with its source.
 
     Attributes:
-        name: such as "mesh", "wheel side band", "pinion ghost order".
-        order: of the shaft of that gear, of the mesh the number of its harmonic.
-        pinion_order: the same line as order of the pinion, often no whole number.
-        amplitude: [um].
+        name: source, such as "mesh", "wheel side band", "pinion ghost order".
+        order: order of the shaft of the gear; for the mesh the number of the harmonic.
+        pinion_order: order of the line on the pinion shaft, often not a whole number.
+        amplitude: amplitude [um].
     """
 
     name: str
@@ -98,20 +98,21 @@ class NamedOrder(NamedTuple):
 
 
 def amplitudes(curve: ArrayLike) -> np.ndarray:
-    """Amplitudes of all lines of a spectrum: line k is k waves over all windows."""
+    """Amplitudes of all lines of the spectrum of a curve, in its unit: line k has k waves over all windows."""
     return np.abs(np.fft.rfft(np.asarray(curve))) * (2 / np.size(curve))
 
 
 def named_orders(revolution: Revolution, teeth: Teeth, harmonics: int = 3) -> list[NamedOrder]:
-    """Mesh orders, shaft orders 1 to 3, side bands and ghost orders of both gears, as far as the windows have them.
+    """Mesh orders, shaft orders 1 to 3, side bands and ghost orders of both gears, if the windows resolve them.
 
     Args:
-        revolution: a single one of concrete numbers.
-        teeth: that it was solved for: the orders of their undulations are ghost orders.
-        harmonics: of the mesh.
+        revolution: a single revolution of concrete numbers.
+        teeth: deviations of the teeth; the orders of their undulations are ghost orders.
+        harmonics: number of mesh harmonics.
 
     Returns:
-        the lines by the order of the pinion, each named once: a ghost order that is a side band too counts as ghost.
+        the lines sorted by the pinion order, each with one name: a ghost order that is also a side band is named ghost
+        order.
     """
     amplitude = amplitudes(revolution.transmission_error)
     windows, found = revolution.windows, {}
@@ -134,7 +135,7 @@ def named_orders(revolution: Revolution, teeth: Teeth, harmonics: int = 3) -> li
 
 
 def _kinds(count: int, waves: Iterable[Undulation], harmonics: int) -> Iterator[tuple[int, str]]:
-    """Orders of one shaft and what they are."""
+    """Orders of one shaft and their kinds."""
     orders = (int(wave.order) for wave in waves)
     yield from ((order, "ghost order") for order in orders if order > _SIDE_BANDS)
     yield from ((order, "shaft order") for order in range(1, _SIDE_BANDS + 1))
@@ -144,12 +145,15 @@ def _kinds(count: int, waves: Iterable[Undulation], harmonics: int) -> Iterator[
 
 
 def total_composite_error(revolution: Revolution, of: Curve | None = None) -> Float[Array, "*batch"]:
-    """Largest minus smallest transmission error over all windows [um]: F'_i under load, or of another curve."""
+    """Total composite deviation F'_i under load: range of the transmission error, or another curve, over all windows
+    [um].
+    """
     return spread(revolution.transmission_error if of is None else of, axis=-1)
 
 
 def tooth_to_tooth_error(revolution: Revolution, of: Curve | None = None) -> Float[Array, "*batch"]:
-    """Largest range of the transmission error over one base pitch, wherever it begins [um]: f'_i under load."""
+    """Tooth-to-tooth composite deviation f'_i under load: largest range of the transmission error in a base pitch [um].
+    """
     curve = revolution.transmission_error if of is None else of
     positions, places = revolution.cycles.kinematics.resolution.positions, curve.shape[-1]
     if revolution.repeats:
@@ -160,13 +164,14 @@ def tooth_to_tooth_error(revolution: Revolution, of: Curve | None = None) -> Flo
 
 
 def tooth_shares(revolution: Revolution, gear: GearName) -> Float[Array, "*batch teeth"]:
-    """Load share of every tooth over its time in mesh, `Revolution.pair_share`, the largest of its passages.
+    """Load share of every tooth over its time in mesh, shape (teeth,): the largest `Revolution.pair_share` of the
+    tooth.
 
-    Teeth that are equal have 1; 1.1 carries 10 % more than the mean. NaN for teeth that do not come and go within the
-    windows.
+    Equal teeth have a share of 1; a tooth with 1.1 carries 10 % more than the mean. NaN for teeth without a complete
+    passage within the windows.
 
     Raises:
-        ValueError: for no such gear.
+        ValueError: for an unknown gear.
     """
     if gear not in GEARS:
         raise ValueError(f'gear = {gear!r} must be "pinion" or "wheel"')

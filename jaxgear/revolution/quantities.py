@@ -1,7 +1,7 @@
-"""Numbers of a revolution as quantities: objectives, limits, columns of sweeps.
+"""Results of a revolution as quantities: objectives, limits, columns of sweeps.
 
-A name alone does not say which teeth differ by how much: `Teeth.quantity` gives the quantity, and a design file has the
-table [teeth].
+A quantity of a revolution needs the deviations of the teeth besides its name: `Teeth.quantity` supplies them in Python,
+the table [teeth] in a design file.
 """
 
 from collections.abc import Callable, Mapping
@@ -21,7 +21,7 @@ Scalar = Float[Array, ""]
 
 
 def _rss(amplitudes: Array) -> Scalar:
-    """Root of the sum of squares; its derivative is zero where all are."""
+    """Root of the sum of squares; the derivative at zero is zero."""
     return safe_sqrt(jnp.sum(amplitudes**2))
 
 
@@ -57,7 +57,7 @@ OF_REVOLUTION: Mapping[str, Callable[[Revolution], Scalar]] = {
 
 
 def number_of(name: str, revolution: Revolution) -> Scalar:
-    """A quantity of a revolution; NaN where a contact has not converged."""
+    """Value of a quantity of a revolution, shape (); NaN if a contact has not converged."""
     return jnp.where(jnp.all(revolution.converged), OF_REVOLUTION[name](revolution), jnp.nan)
 
 

@@ -1,4 +1,4 @@
-"""Settings: which teeth differ by how much, and over how many base pitches they run."""
+"""Settings of a revolution: deviations of the teeth, and number of base pitches."""
 
 from math import lcm
 from typing import Any
@@ -19,21 +19,21 @@ def _pair(counts: Any) -> Any:
 
 
 class Teeth(AbstractSettings):
-    """Deviations of the teeth of both gears, and the base pitches over which the pair is solved.
+    """Deviations of the teeth of both gears, and number of base pitches of the revolution.
 
-    `quantity` gives with it the numbers of a revolution, `REVOLUTION_QUANTITIES`. Deviations of manufactured gears in
-    searches and sweeps do not change them: these teeth have their own.
+    `quantity` returns the quantities of a revolution, `REVOLUTION_QUANTITIES`. Deviations of manufactured gears in
+    searches and sweeps do not affect them: the deviations given here are used.
 
     Attributes:
         pinion, wheel: deviations of the teeth; None for equal teeth.
         over: "pinion" or "wheel" for one revolution of that gear, "hunting" for all pairings of teeth (lcm(z1, z2) base
-            pitches), or a number of base pitches; None for the revolution of the only gear whose teeth differ, and the
-            hunting period where those of both do.
-        counts: numbers of teeth of pinion and wheel; None for those of deviations and gears. A gear without deviations
-            whose numbers are traced, as in sweeps and searches, needs them.
+            pitches), or a number of base pitches; None for a revolution of the only gear with deviations, or for the
+            hunting period if both gears have deviations.
+        counts: numbers of teeth of pinion and wheel; None for the numbers of deviations and gears. They are needed for
+            a gear without deviations whose numbers are traced, as in sweeps and searches.
 
     Raises:
-        ValueError: for something else to run over.
+        ValueError: for another value of `over`.
         TypeError: for deviations of another type.
     """
 
@@ -66,7 +66,7 @@ class Teeth(AbstractSettings):
         """Numbers of teeth of a pair.
 
         Raises:
-            ValueError: where it has others than the deviations, or a number is needed that is being traced.
+            ValueError: if the numbers differ from those of the deviations, or a required number is traced.
         """
         found = []
         for place, (name, gear, of) in enumerate(zip(_OVER, pair.gears, self.deviations)):
@@ -87,7 +87,7 @@ class Teeth(AbstractSettings):
         """Number of base pitches, for numbers of teeth of pinion and wheel.
 
         Raises:
-            ValueError: where there are too many in the hunting period.
+            ValueError: if the hunting period has too many base pitches.
         """
         over = self.over
         if over is None:
@@ -101,5 +101,5 @@ class Teeth(AbstractSettings):
         return found
 
     def repeats(self, counts: tuple[int, int]) -> bool:
-        """Whether the gears whose teeth differ make whole revolutions."""
+        """True if all gears with deviations make whole revolutions."""
         return self.windows(counts) % lcm(*(count for count, of in zip(counts, self.deviations) if of is not None)) == 0

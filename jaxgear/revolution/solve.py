@@ -1,4 +1,4 @@
-"""Contact over whole revolutions: one window of a base pitch after the other, each with the teeth that are in it."""
+"""Contact over whole revolutions, in windows of one base pitch, each with the deviations of the teeth in mesh."""
 
 from dataclasses import fields
 from functools import partial, reduce
@@ -30,16 +30,13 @@ GEARS: tuple[GearName, GearName] = ("pinion", "wheel")
 
 
 class Revolution(WithStatus, eqx.Module):
-    """Result of `solve_revolution`: mesh cycles one after the other, in which the teeth of the pair take turns.
-
-    Of many revolutions made by `jax.vmap` every array has the batch axes in front.
+    """Result of `solve_revolution`: consecutive mesh cycles with different teeth in mesh; `jax.vmap` adds batch axes.
 
     Attributes:
-        cycles: of the windows of one base pitch, with the windows as last of the batch axes; metrics take them as any
-            mesh cycles.
-        teeth: of pinion and wheel.
-        repeats: whether the last window is followed by the first one: whether the gears whose teeth differ have made
-            whole revolutions.
+        cycles: mesh cycles of the windows of one base pitch; the windows are the last batch axis. Metrics accept them
+            like any mesh cycles.
+        teeth: numbers of teeth of pinion and wheel.
+        repeats: True if the windows are periodic: all gears with deviations have made whole revolutions.
     """
 
     cycles: MeshCycle
@@ -79,10 +76,10 @@ class Revolution(WithStatus, eqx.Module):
 
     @property
     def pair_share(self) -> Float[Array, "*batch meshes"]:
-        """Load share of every pair, summed over the time that it is in mesh [base pitches]; 1 on average.
+        """Load share of every pair, integrated over its time in mesh [base pitches]; 1 on average.
 
-        Pair 0 touches at the pitch point when the phase is 0. Where the windows repeat there are as many pairs as
-        windows; otherwise those that come and go within the windows, see `first_pair`.
+        Pair 0 touches at the pitch point at phase 0. Periodic windows have as many pairs as windows; otherwise the
+        pairs with a complete passage within the windows are included, see `first_pair`.
         """
         forces = self.cycles.pair_force
         shares = jnp.mean(forces / jnp.sum(forces, axis=-2, keepdims=True), axis=-1)
@@ -95,7 +92,7 @@ class Revolution(WithStatus, eqx.Module):
 
     @property
     def first_pair(self) -> int:
-        """Number of the first of `pair_share`."""
+        """Number of the first pair in `pair_share`."""
         resolution = self.cycles.kinematics.resolution
         return 0 if self.repeats else resolution.chosen_pairs - 1 - resolution.leading
 
@@ -123,27 +120,27 @@ def solve_revolution(
     pinion: AbstractModification | None = None,
     wheel: AbstractModification | None = None,
 ) -> Revolution:
-    """Loaded tooth contact over whole revolutions of gears whose teeth differ.
+    """Loaded tooth contact over whole revolutions of gears with deviations of single teeth.
 
     Window k is the base pitch that lies k base pitches after that of the mesh; pair n is tooth n mod z1 of the pinion
-    on tooth n mod z2 of the wheel. Each window is a contact problem of its own, solved as by `solve` for the material
-    that modifications and deviations of its teeth remove together. Only few windows are in memory at a time; reverse
-    mode works them out again.
+    on tooth n mod z2 of the wheel. Each window is a separate contact problem, solved like `solve` for the material
+    removed by modifications and by the deviations of its teeth. Few windows are in memory at a time; reverse mode
+    computes them again.
 
     Args:
         mesh: prepared mesh; deviations that vary over the face need several slices.
-        torque: on the pinion [N m], scalar; or an `OperatingPoint`.
-        teeth: deviations of the teeth, and over how many base pitches.
+        torque: torque on the pinion [N m], shape (); or an `OperatingPoint`.
+        teeth: deviations of the teeth, and number of base pitches.
         pinion: modification of all teeth of the pinion; None for the nominal involute.
         wheel: modification of all teeth of the wheel; None for the nominal involute.
 
     Returns:
-        the revolution, differentiable with respect to every number. Where the number of pairs was left open and is too
-        small for this load, and nothing is traced, it has more of them.
+        the revolution, differentiable with respect to every number. If the number of pairs was chosen automatically and
+        is too small for this load, more pairs are used, unless traced.
 
     Raises:
-        TypeError: for something else than a prepared mesh, settings of teeth or a modification.
-        ValueError: for deviations of another number of teeth, and as `solve`.
+        TypeError: if the arguments are not a prepared mesh, settings of teeth or modifications.
+        ValueError: for deviations of another number of teeth, and for all errors of `solve`.
     """
     check_mesh(mesh)
     if not isinstance(teeth, Teeth):
@@ -162,7 +159,7 @@ def solve_revolution(
 
 
 def _check_slices(mesh: Mesh, teeth: Teeth) -> None:
-    """Raises a `ValueError` where teeth differ along the face, which a mesh of one slice cannot show."""
+    """Raise a `ValueError` for deviations that vary along the face on a mesh of one slice."""
     if mesh.resolution.slices > 1:
         return
     for name, of in zip(GEARS, teeth.deviations):
@@ -188,7 +185,7 @@ _CONTACT = tuple(field.name for field in fields(MeshCycle) if field.name not in 
 
 @program
 def _cycles(kinematics: Kinematics, margins: Margins, at: OperatingPoint, found: dict[str, Any]) -> MeshCycle:
-    """The cycles of all windows, each with what they have in common."""
+    """Mesh cycles of all windows from their results and the common kinematics and load."""
     return jax.vmap(lambda each: MeshCycle(kinematics, margins, at, None, None, **each))(found)
 
 
@@ -222,12 +219,12 @@ def _contacts(
 
 
 def pairs_in_window(sizes: Resolution) -> Int[np.ndarray, " pairs"]:
-    """Numbers of the pairs of teeth of window 0, with those before and behind them."""
+    """Numbers of the pairs of teeth of window 0, with one more pair on either side."""
     return np.arange(-1, sizes.chosen_pairs + 1) - sizes.leading
 
 
 def displaced(mesh: Mesh, at: Torque, removed: RemovedMaterial, pitch: Array) -> tuple[MeshCycle, Statuses]:
-    """Cycle and status of a window whose pairs are apart by their pitch deviations [um], those of `pairs_in_window`."""
+    """Mesh cycle and status of a window with pitch deviations of its pairs [um], in the order of `pairs_in_window`."""
     removed = removed + pitch[1:-1, None, None]
     found = solve_removed(mesh, at, removed)
     return found, _status(mesh, found, removed, pitch)
@@ -266,7 +263,7 @@ def whole_revolutions(revolution: Revolution, gear: GearName) -> int:
     """Revolutions of a gear in the windows.
 
     Raises:
-        ValueError: where it makes no whole number of them, so that it has no orders, or there is no such gear.
+        ValueError: for an unknown gear, or if the gear does not make whole revolutions and so has no orders.
     """
     if gear not in GEARS:
         raise ValueError(f'gear = {gear!r} must be "pinion" or "wheel"')

@@ -1,8 +1,9 @@
-"""Deviations of the single teeth of a gear from each other.
+"""Deviations of the single teeth of a gear.
 
 Teeth are counted in the order in which they come into mesh: pair n is tooth n mod z1 of the pinion on tooth n mod z2
-of the wheel. Deviations are positive where material is missing, like modifications. A measuring report that counts
-pitches in this order has that sign for the pinion, and the opposite one for the wheel, whose other side is touched.
+of the wheel. Deviations are positive for missing material, like modifications. A measuring report that counts pitches
+in this order has the same sign for the pinion, and the opposite sign for the wheel, whose opposite flanks are in
+contact.
 """
 
 from collections.abc import Sequence
@@ -29,16 +30,16 @@ _RUN_OUT = 0.9  # F_rT over F_pT, ISO 1328-1:2013, annex on run-out
 
 
 class Undulation(Checked):
-    """A wave around a whole gear, over all its flanks: w = a cos(order * turn + phase), by the angle it has turned.
+    """Undulation of all flanks around a gear: w = a cos(order * turn + phase), with the angle of rotation `turn`.
 
-    A tooth n touches, at the roll length rho and the face coordinate y, at turn = 2 pi n / z +- (rho / r_b - 2 y
-    tan(beta) / d), + of the pinion and - of the wheel, on which contacts move down the flank. An eccentric gear has the
-    order 1, one that was generated with a worm wheel of l teeth the ghost order l.
+    Tooth n touches at the roll length rho and the face coordinate y at turn = 2 pi n / z +- (rho / r_b - 2 y tan(beta)
+    / d), + for the pinion and - for the wheel, whose contacts move from tip to root. An eccentric gear has order 1; a
+    gear generated with a worm wheel of l teeth has the ghost order l.
 
     Attributes:
-        amplitude: half of peak to valley, normal to the flank.
-        order: waves around the gear.
-        phase: at tooth 0 on the base circle.
+        amplitude: half of the peak-to-valley value, normal to the flank.
+        order: number of waves around the gear.
+        phase: phase angle at tooth 0 on the base circle.
     """
 
     amplitude: Scalar = number("um", low=0.0)
@@ -93,15 +94,15 @@ class TeethDeviations(Checked):
         slopes = TeethDeviations(np.zeros(48), jax.vmap(jg.ProfileSlope)(np.linspace(-3, 3, 48)))
 
     Attributes:
-        pitch: cumulative pitch deviation F_pi of every tooth on the reference circle, shape (teeth,); its mean is of no
-            effect on anything but the mean transmission error.
-        flanks: modifications of the teeth, every array of which has one entry per tooth in front, as `jax.vmap` makes
-            them; or a list with one per tooth, all of one kind and size. None without.
-        undulations: around the gear.
+        pitch: cumulative pitch deviation F_pi of every tooth on the reference circle, shape (teeth,); its mean affects
+            only the mean transmission error.
+        flanks: modifications of the teeth with a leading axis (teeth,) on every array, for instance made with
+            `jax.vmap`; or a list of one modification per tooth, all of the same kind and size. None for none.
+        undulations: undulations around the gear.
 
     Raises:
         ValueError: for flanks of another number of teeth.
-        TypeError: for flanks that are no modifications.
+        TypeError: if flanks are not modifications.
     """
 
     pitch: Pitches = number("um", shape=("teeth",), fewest=2)
@@ -133,15 +134,16 @@ class TeethDeviations(Checked):
         flanks: AbstractModification | Sequence[AbstractModification] | None = None,
         undulations: Sequence[Undulation] = (),
     ) -> "TeethDeviations":
-        """Deviations with the cumulative pitch that follows from single pitch deviations.
+        """Deviations of the teeth from single pitch deviations.
 
         Args:
-            deviations: f_pi of every tooth, from the one before it, on the reference circle [um], shape (teeth,).
-            flanks, undulations: the other fields.
+            deviations: single pitch deviation f_pi of every tooth against the previous one, on the reference circle
+                [um], shape (teeth,).
+            flanks, undulations: as for the class.
 
         Raises:
-            ValueError: where they do not close: around the gear they sum to zero, within the rounding of reports (0.1
-                um times the root of their number), which is spread over all pitches.
+            ValueError: if the sum around the gear is not zero within the rounding of reports (0.1 um times the square
+                root of the number of teeth); a smaller sum is distributed over all pitches.
         """
         single = real(deviations, "TeethDeviations: single pitch deviations")
         known, unit = concrete(single), "TeethDeviations: single pitch deviations"
@@ -166,15 +168,16 @@ class TeethDeviations(Checked):
     ) -> "TeethDeviations":
         """Random deviations of a gear within the pitch and run-out tolerances of ISO 1328-1:2013.
 
-        The gear is eccentric (order 1) by up to half the run-out tolerance F_rT = 0.9 F_pT, oval (order 2) by what the
-        cumulative pitch tolerance F_pT then leaves, each times a draw and at a random phase, and every tooth is
-        displaced on its own by up to half of what f_pT leaves. So no draw exceeds f_pT, F_pT or F_rT.
+        The gear has an eccentricity (order 1) up to half the run-out tolerance F_rT = 0.9 F_pT and an ovality (order 2)
+        up to the remainder of the cumulative pitch tolerance F_pT, each times a random number and at a random phase.
+        Every tooth is also displaced individually by up to half of the remainder of f_pT. No sample exceeds f_pT, F_pT
+        or F_rT.
 
         Args:
-            gear: of a concrete number of teeth.
+            gear: gear with a concrete number of teeth.
             quality_class: flank tolerance class, 1 (finest) to 11.
-            key: of the random numbers; `jax.vmap` over many.
-            distribution: between the limits; None for `TruncatedNormal()`.
+            key: key of the random numbers; use `jax.vmap` over many keys.
+            distribution: distribution between the limits; None for `TruncatedNormal()`.
 
         Raises:
             ValueError: for a class or a gear outside the range of the standard.
@@ -203,11 +206,11 @@ class TeethDeviations(Checked):
 
     @property
     def differ_in_shape(self) -> bool:
-        """Whether teeth differ by more than their pitch."""
+        """True if teeth differ in shape: the gear has flanks or undulations."""
         return self.flanks is not None or bool(self.undulations)
 
     def of_tooth(self, tooth: Array, gear: Gear, direction: float) -> AbstractModification:
-        """Modification of one tooth besides its pitch deviation.
+        """Modification of one tooth without its pitch deviation.
 
         Args:
             tooth: number of the tooth.

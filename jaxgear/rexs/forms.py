@@ -33,7 +33,7 @@ _DAMAGED = zipfile.BadZipFile, zlib.error, EOFError, ValueError, IndexError, Run
 
 
 def parse(content: bytes) -> Model:
-    """The model of a file in XML or JSON, or in an archive of one.
+    """Model from the content of a file in XML or JSON, or of an archive with one such file.
 
     Raises:
         DesignFileError: for a file of another form, see `unpacked`, or no REXS model.
@@ -45,14 +45,14 @@ def parse(content: bytes) -> Model:
 
 
 def content_of(model: Model, name: PurePath) -> bytes:
-    """The file of a model, in the form that the end of its name says."""
+    """Content of the file of a model, in the form given by the file extension."""
     data, ending = data_of(model), name.suffix
     content = _to_json(data) if ending in (".rexsj", ".json") else _to_xml(data)
     return packed(content, f"{name.stem}.rexs") if ending in _ARCHIVES else content
 
 
 def unpacked(held: bytes) -> bytes:
-    """The one model in a zip archive.
+    """Content of the single model in a zip archive.
 
     Raises:
         DesignFileError: for an archive that is damaged or encrypted, has no model or several, or one of more than

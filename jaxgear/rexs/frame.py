@@ -54,7 +54,7 @@ class Frame:
         return self.datum * length if face == "datum_face" else -self.datum * length
 
     def side(self, face: str) -> Literal["negative", "positive"]:
-        """End of the face, by the sign of its coordinate, at which the "datum_face" or the "non_datum_face" is."""
+        """End of the face, "negative" or "positive" by its coordinate, of the "datum_face" or the "non_datum_face"."""
         return "negative" if self.mirror * self.place(face, 1.0) < 0 else "positive"
 
     def removed(
@@ -86,7 +86,7 @@ def _amount(modification: AbstractModification, flank: Flank):
 
 
 def frames(pair: GearPair) -> tuple[Frame, Frame]:
-    """The flanks of pinion and wheel."""
+    """Frames of the flanks of pinion and wheel."""
     path = path_of_contact(pair)
     starts = path.pinion_roll_length(path.start), path.wheel_roll_length(path.end)
     pinion, wheel = (_frame(gear, start) for gear, start in zip(pair.gears, starts))
@@ -98,5 +98,5 @@ def _frame(gear: Gear, start) -> Frame:
 
 
 def same(first: float, second: float) -> bool:
-    """Whether two lengths differ by no more than their digits [mm]."""
+    """True if two lengths are equal within the digits of a file [mm]."""
     return abs(first - second) <= _SAME

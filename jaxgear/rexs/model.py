@@ -89,7 +89,7 @@ class Component:
     keys: dict[str, str] = field(default_factory=dict)
 
     def where(self, attribute: str = "") -> str:
-        """`cylindrical_gear 15: face_width`."""
+        """Place of a component or attribute in messages, such as `cylindrical_gear 15: face_width`."""
         return f"{self.type} {self.id}" + (f": {attribute}" if attribute else "")
 
     def refuse(self, attribute: str, problem: str) -> DesignFileError:
@@ -102,7 +102,7 @@ class Component:
         return self.refuse(attribute, f"missing, give it with --set {key}=VALUE" if key else "missing")
 
     def number(self, attribute: str, unit: str, *, shift: int = 0) -> float | None:
-        """A number times 10^shift, None where it is absent. The shift is of the decimal digits, so that it is exact."""
+        """Number times 10^shift, None if absent. The shift moves the decimal digits and is exact."""
         value = self._value(attribute, unit)
         if value is None:
             return None
@@ -127,7 +127,7 @@ class Component:
         return np.array([self._float(attribute, item, unit, shift) for item in value])
 
     def choice(self, attribute: str, default: str | None, allowed: Iterable[str]) -> str:
-        """One of several words, required unless there is a default."""
+        """Word of an attribute, one of `allowed`; required unless a default is given."""
         value = self._value(attribute, "none") or default
         names = tuple(allowed)
         if value is None:
@@ -168,7 +168,13 @@ class Component:
 
 @dataclass(frozen=True)
 class Relation:
-    """Relation of several components: type, and (role, id) of each component."""
+    """Relation of several components.
+
+    Attributes:
+        type: type of the relation.
+        refs: (role, id) of each component.
+        order: order of the relation; None without one.
+    """
 
     type: str
     refs: tuple[tuple[str, int], ...]
@@ -192,7 +198,7 @@ class Model:
     cases: dict[int, dict[int, Component]] = field(default_factory=dict)
 
     def component(self, number: int) -> Component:
-        """The component of an id."""
+        """Component of an id; raises `DesignFileError` if it is missing."""
         if number not in self.components:
             raise DesignFileError("", f"a relation names component {number}, which is missing")
         return self.components[number]
@@ -228,7 +234,7 @@ def _attributes_of(values: dict[str, tuple[Any, str]]) -> dict[str, Attribute]:
 
 
 def model_of(data: dict[str, Any]) -> Model:
-    """The model of the data of a file.
+    """Model from the data of a file.
 
     Raises:
         DesignFileError: for data of another structure, or an id that is not a number or occurs twice.
@@ -249,7 +255,7 @@ def model_of(data: dict[str, Any]) -> Model:
 
 
 def data_of(model: Model) -> dict[str, Any]:
-    """The data of a file: version of REXS, program and time, relations, components, load cases."""
+    """Data of the file of a model: version of REXS, program and time, relations, components, load cases."""
     data: dict[str, Any] = {
         "version": model.version,
         "applicationId": "jaxgear",

@@ -1,4 +1,4 @@
-"""Modifications as REXS has them, and points of the flank for what it does not know.
+"""Conversion of modifications to those of REXS, or to points of the flank for others.
 
 Every point has its face coordinate, its diameter and its amount: three arrays of one length, which
 cannot be misread. Points are denser where the flank is curved, so that the interpolation stays within a given error,
@@ -72,7 +72,7 @@ def plain_terms(
 
 
 def powers(curve: AbstractCurve) -> dict[int, float] | None:
-    """Coefficients of a curve that is b1 d + b2 d^2, by their powers; None for any other, a user's own too."""
+    """Coefficients of a curve b1 d + b2 d^2, by power; None for other curves, also for those of users."""
     if not type(curve).__module__.startswith(AbstractCurve.__module__):
         return None
     match curve:
@@ -154,7 +154,7 @@ def points(modification: AbstractModification, frame: Frame, error: float) -> tu
 
 
 def flank_of(component: Component, frame: Frame) -> AbstractModification:
-    """The modification that a component of type `topographical_modification` describes.
+    """Modification of a component of type `topographical_modification`.
 
     Raises:
         DesignFileError: where the points are no grid, lie below the base circle, or are not interpolated linearly.

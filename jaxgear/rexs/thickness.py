@@ -46,9 +46,9 @@ def write_thickness(gear: Gear) -> dict[str, tuple[Any, str]]:
 
 
 def read_thickness(gear: Component, made: Gear) -> dict[str, Any]:
-    """Upper allowance of the tooth thickness and its tolerance [um], from deviations of chord, span or over balls.
+    """Upper tooth thickness allowance and tolerance [um], from deviations of chord, span or dimension over balls.
 
-    Of several the first is taken, as they say the same; a single limit is both.
+    Of several measures the first is used, as they are equivalent; a single limit is both upper and lower limit.
     """
     for names, limits, allowance in _deviations(gear, made):
         given = [limit for limit in limits if limit is not None]

@@ -1,7 +1,7 @@
-"""Columns of the table: the quantity that each holds, and the cases of a variant that it is of.
+"""Columns of the table of a sweep: quantity, and cases of a variant.
 
-A text that begins like a formula gets an apostrophe in front, which spreadsheets take for "this is text"; who reads the
-file again leaves it out.
+A text that begins like a formula is written with a leading apostrophe, which marks text in spreadsheets; reading
+removes it.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -20,7 +20,7 @@ _TEXT = "'"
 
 
 def as_text(heading: str) -> str:
-    """A heading that no spreadsheet takes for a formula."""
+    """Heading with a leading apostrophe if a spreadsheet would take it for a formula."""
     return f"{_TEXT}{heading}" if heading.startswith(_FORMULA) else heading
 
 
@@ -45,10 +45,12 @@ def described(
     better: Better = "smaller",
     form: str = ".4g",
 ) -> Quantity:
-    """A quantity of which only the description is known, as of a parameter or of a column that is read from a file.
+    """Quantity with a description only, for parameters and for columns read from a file.
+
+    Calling it with a cycle raises a `ValueError`.
 
     Args:
-        name, unit, label, meaning, better, form: as of a `Quantity`; called with a cycle it raises a `ValueError`.
+        name, unit, label, meaning, better, form: as for `Quantity`.
     """
     return Quantity(name, _not_computed, unit, meaning, better=better, label=label, form=form)
 
@@ -59,15 +61,15 @@ def _not_computed(cycle: MeshCycle) -> NoReturn:
 
 @dataclass(frozen=True)
 class Column:
-    """One column of the table: a quantity of every variant, and the cases of the variant that it is of.
+    """One column of the table: a quantity of every variant in one or several cases.
 
     Attributes:
-        quantity: the number that it holds.
-        kind: what this number is.
-        torque: of the pinion to which a result belongs [N m]; None for all torques.
-        speed: of the pinion at this torque [rpm]; None where the loads have none.
-        statistic: by which several cases are joined, such as "mean" or "q95"; "" for a single case. The cases are those
-            of all torques and manufactured gears, or the manufactured gears of one torque.
+        quantity: quantity of the column.
+        kind: kind of the column: "number", "parameter", "result", "flag" or "status".
+        torque: torque on the pinion of a result [N m]; None for all torques.
+        speed: speed of the pinion at this torque [rpm]; None for loads without speeds.
+        statistic: measure over several cases, such as "mean" or "q95"; "" for a single case. The cases are all torques
+            and manufactured gears, or the manufactured gears at one torque.
         low, high: range of a parameter.
     """
 
@@ -81,7 +83,7 @@ class Column:
 
     @property
     def name(self) -> str:
-        """As files carry it: with the unit for results, `ppte_um_25Nm_q95`, as written by the user for parameters."""
+        """Name in files: with the unit for results, `ppte_um_25Nm_q95`; as given by the user for parameters."""
         return f"{self.quantity.key if self.kind == 'result' else self.quantity.name}{self._case}"
 
     @property
@@ -96,7 +98,7 @@ class Column:
 
     @property
     def words(self) -> str:
-        """In words without the unit: "PPTE at 25 N m, q95 over gears"."""
+        """Name in words without the unit: "PPTE at 25 N m, q95 over gears"."""
         if self.torque is None:
             return f"{self.quantity.words} {self.statistic}" if self.statistic else self.quantity.words
         speed = "" if self.speed is None else f" and {self.speed:.12g} rpm"
@@ -105,7 +107,7 @@ class Column:
 
     @property
     def heading(self) -> str:
-        """In words with the unit: `PPTE mean [um]`."""
+        """Name in words with the unit: `PPTE mean [um]`."""
         return f"{self.words} [{self.unit}]" if self.unit else self.words
 
     @property
@@ -115,12 +117,12 @@ class Column:
 
     @property
     def better(self) -> Better | Literal[""]:
-        """Whether small or large values of a result are the better ones, "" where neither is."""
+        """Direction of improvement of a result, "smaller" or "larger"; "" for other columns."""
         return self.quantity.better if self.kind == "result" else ""
 
     @property
     def sign(self) -> int:
-        """-1 where large values are the better ones, else 1."""
+        """Sign of the quantity in a minimization: -1 if larger values are better, else 1."""
         return self.quantity.sign
 
     @property
@@ -135,12 +137,12 @@ FLAG, CAUSE = Column(described(CONVERGED), "flag"), Column(described(STATUS), "s
 
 
 def axis_label(of: Quantity | Column) -> str:
-    """A number in words with its unit in print, as axes carry it: "PPTE [µm]", "contact ratio [-]"."""
+    """Label of an axis, name in words with printed unit: "PPTE [µm]", "contact ratio [-]"."""
     return f"{of.words} [{printed_unit(of.unit) or '-'}]"
 
 
 def printed_unit(unit: str) -> str:
-    """A unit in print."""
+    """Unit in print, with µ, superscripts and degree signs."""
     return unit.replace("um", "µm").replace("mm3", "mm³").replace("degC", "°C")
 
 
@@ -148,7 +150,7 @@ def parameter_columns(plan: AbstractPlan, units: Mapping[str, str], taken: Seque
     """One column per parameter of the plan.
 
     Raises:
-        ValueError: when a parameter has the name of another column.
+        ValueError: if a parameter has the name of another column.
     """
     for name in plan.names:
         if name in taken or name in (VARIANT, CONVERGED, STATUS):
@@ -160,15 +162,15 @@ def parameter_columns(plan: AbstractPlan, units: Mapping[str, str], taken: Seque
 def result_columns(
     results: Sequence[Quantity], conditions: Conditions, measures: Sequence[AbstractMeasure]
 ) -> list[Column]:
-    """The columns of every result, in the order in which the evaluation gives them.
+    """Columns of all results, in the order of the evaluation.
 
-    One case makes one column, `ppte_um`. Several make one for each measure over all of them, `ppte_um_mean`; several
-    torques besides those of each torque, `ppte_um_25Nm`, over its manufactured gears `ppte_um_25Nm_q95`.
+    A single case gives one column, `ppte_um`. Several cases give one column per measure over all cases, `ppte_um_mean`.
+    Several torques add columns for each torque, `ppte_um_25Nm`, and with manufactured gears `ppte_um_25Nm_q95`.
 
     Args:
-        results: the quantities wanted.
+        results: quantities to evaluate.
         conditions: loads and manufactured gears.
-        measures: by which the cases are joined, none for a single one.
+        measures: measures over the cases; empty for a single case.
 
     Raises:
         ValueError: for no or repeated results.
@@ -198,13 +200,13 @@ def over_torques(
     pinion: AbstractModification | None = None,
     wheel: AbstractModification | None = None,
 ) -> tuple[MeshCycle, ...]:
-    """One design under every one of several torques, by one compiled program whatever the kind of its modifications.
+    """Mesh cycles of one design under several torques, by one compiled program for all kinds of modifications.
 
-    For figures and reports of a few designs; `jax.vmap` of `solve` is faster for many, and differentiable.
+    Use it for figures and reports of a few designs; `jax.vmap` of `solve` is faster for many, and differentiable.
 
     Args:
         mesh: prepared mesh.
-        torques: on the pinion [N m], in any order.
+        torques: torques on the pinion [N m], in any order.
         pinion: modification of the pinion flank; None for the nominal involute.
         wheel: modification of the wheel flank; None for the nominal involute.
 

@@ -37,8 +37,8 @@ class Evaluator:
     """Evaluates variants in blocks of one size, so that one compilation serves them all.
 
     Attributes:
-        columns: the result columns.
-        capacity: rows that a call evaluates; fewer are padded.
+        columns: columns of the results.
+        capacity: number of rows of a call; fewer rows are padded.
     """
 
     def __init__(
@@ -54,15 +54,15 @@ class Evaluator:
         """Prepares the evaluation on all local devices.
 
         Args:
-            variants: what the variables make.
+            variants: variants as functions of the variables.
             example: a value of every variable.
-            results: the quantities wanted.
-            measures: by which the cases of a variant are joined; none for a single case.
+            results: quantities to evaluate.
+            measures: measures over the cases of a variant; empty for a single case.
             rows: largest number of variants of a call.
-            few: whether compiling takes longer than all evaluations.
+            few: True if compilation takes longer than all evaluations.
 
         Raises:
-            ValueError: for no or repeated results, and for whatever the variants or a result refuse.
+            ValueError: for no or repeated results, and for all errors of the variants or of a result.
         """
         conditions = variants.conditions
         self.columns = result_columns(results, conditions, measures)
@@ -80,11 +80,11 @@ class Evaluator:
         jax.eval_shape(partial(_numbers, self._task, self._data), example.astype(self._dtype))
 
     def __call__(self, rows: np.ndarray) -> Callable[[], dict[str, np.ndarray]]:
-        """Starts the evaluation of at most `capacity` rows; the devices go on while the host does something else.
+        """Start the evaluation of at most `capacity` rows, asynchronously to the host.
 
         Returns:
-            what waits for the result columns, the flag and the numbers of `Status`; the results of failed variants are
-            NaN.
+            function that waits for the evaluation and returns the result columns, the flag and the numbers of `Status`;
+            results of failed variants are NaN.
         """
         placed = divided(padded(rows.astype(self._dtype), self.capacity), self._devices)
         values, status = self._evaluate(self._task, placed, self._data)

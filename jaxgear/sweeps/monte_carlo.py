@@ -25,23 +25,23 @@ _BLOCK = 4096  # samples per call and device
 
 
 class Scatter(Checked):
-    """Result of `monte_carlo`.
+    """Scatter of a design over manufactured gears; result of `monte_carlo`.
 
-    A sample fails when its contact solution does not converge or is not finite. It stays in every array and counts
-    against the design: its `ppte` is NaN, which makes `mean` and `std` NaN, and in every quantile it ranks beyond all
-    others, so that bounds can only widen. `scatter.ppte[scatter.converged]` is what is left without them.
+    A sample fails if its contact solution does not converge or is not finite. Failed samples stay in all arrays: their
+    `ppte` is NaN, `mean` and `std` become NaN, and in every quantile they rank beyond all others, so that bounds can
+    only widen. `scatter.ppte[scatter.converged]` excludes them.
 
     Attributes:
         ppte: peak-to-peak transmission error of every sample [um], shape (samples,).
-        converged: bool, shape (samples,).
+        converged: True for every sample that has not failed, shape (samples,).
         nominal_ppte: PPTE of the design without deviations [um].
-        mean, std: of `ppte` [um].
-        ppte_quantile95: 95 % of the samples stay below it [um].
+        mean, std: mean and standard deviation of `ppte` [um].
+        ppte_quantile95: 95 % quantile of `ppte` [um].
         phase: mesh position in base pitches, shape (positions,).
-        nominal_transmission_error: of the design without deviations [um], shape (positions,).
+        nominal_transmission_error: transmission error of the design without deviations [um], shape (positions,).
         quantiles: levels of the quantile curves, ascending, shape (quantiles,).
         transmission_error_quantiles: of the transmission error at every phase [um], shape (quantiles, positions).
-        numbers: the results asked for, of every sample, by name with unit; each of shape (samples,), NaN where failed.
+        numbers: values of the further results by name with unit, shape (samples,) each, NaN for failed samples.
     """
 
     ppte: Float[Array, " samples"] = result("um")
@@ -57,14 +57,14 @@ class Scatter(Checked):
     numbers: dict[str, Float[Array, " samples"]] = result()
 
     def joined(self, of: str | Quantity, measure: AbstractMeasure) -> Scalar:
-        """One number for a result of all samples, such as its 95 % quantile.
+        """Measure of a result over all samples, such as its 95 % quantile, shape ().
 
         Args:
-            of: a result asked for, or "ppte".
+            of: one of the further results, or "ppte".
             measure: `Mean()`, `Worst()`, `Quantile(level)` or `CVaR(level)`.
 
         Raises:
-            ValueError: for a result that was not asked for.
+            ValueError: for a result that was not computed.
         """
         wanted = quantity_of(of)
         known = {"ppte_um": self.ppte, **self.numbers}
@@ -171,7 +171,7 @@ def _block(task, numbers, results: tuple[Quantity, ...], settings, batch: int, d
 
 
 def _solve_number(task, number, results: tuple[Quantity, ...]):
-    """The sample of a number; the nominal design is number 0."""
+    """Solution of the sample with a given number; number 0 is the nominal design."""
     mesh, torque, tolerance, pinion, wheel, key, design, basis, settings = task
     deviation = deviation_of(tolerance, mesh, key, number - 1)
     field = deviation_field(deviation, basis)

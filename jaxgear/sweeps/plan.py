@@ -1,4 +1,4 @@
-"""Which variants a sweep evaluates: numbered rows of parameter values that exist only while they are asked for."""
+"""Plans of a sweep: numbered variants whose parameter values are computed on request."""
 
 import hashlib
 import math
@@ -20,7 +20,7 @@ class AbstractPlan(ABC):
     """A numbered list of variants.
 
     Attributes:
-        names: of the parameters, in the order of the columns of `rows`.
+        names: names of the parameters, in the order of the columns of `rows`.
         low, high: range of every parameter.
         size: number of variants.
     """
@@ -34,12 +34,12 @@ class AbstractPlan(ABC):
 
     @abstractmethod
     def describe(self) -> dict[str, Any]:
-        """Everything that determines the rows, as plain data."""
+        """All data that determine the rows, as plain data."""
 
     def rows(self, start: int, stop: int) -> np.ndarray:
         """Parameter values of the variants `start` to `stop - 1`.
 
-        A variant has the same values however the plan is cut into ranges, and only the range is in memory.
+        The values of a variant do not depend on the range, and only the range is in memory.
 
         Returns:
             float64, shape (stop - start, len(names)).
@@ -53,7 +53,7 @@ class AbstractPlan(ABC):
 
 
 class FullFactorial(AbstractPlan):
-    """Every combination of the levels of all parameters; the last parameter runs fastest, as in nested loops.
+    """Every combination of the levels of all parameters; the last parameter varies fastest.
 
     Attributes:
         levels: values of every parameter.
@@ -95,10 +95,10 @@ class FullFactorial(AbstractPlan):
 
 
 class VariantList(AbstractPlan):
-    """Variants given one by one.
+    """Variants given as a table.
 
     Attributes:
-        values: float64, shape (size, names).
+        values: parameter values, float64, shape (size, names).
     """
 
     def __init__(self, names: Sequence[str], values: Numbers) -> None:

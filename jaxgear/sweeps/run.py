@@ -1,4 +1,4 @@
-"""A sweep: variants in, table out, with the devices and the disk at work at the same time."""
+"""Sweep: evaluation of all variants of a plan into a table; devices and disk work concurrently."""
 
 import re
 import time
@@ -52,7 +52,7 @@ def sweep(
     units: Mapping[str, str] | None = None,
     callback: Callback | None = None,
 ) -> SweepTable:
-    """Evaluates every variant of a plan, on all local devices.
+    """Evaluate every variant of a plan, on all local devices.
 
     With an output folder the rows are written part by part as Parquet, and memory does not depend on their number; the
     folder holds nothing else, so that `pandas.read_parquet(folder)` and `polars.scan_parquet(folder)` read it. An
@@ -74,13 +74,15 @@ def sweep(
 
     Args:
         mesh: prepared mesh; or a function of the named variables that prepares one, traced.
-        torque: on the pinion [N m], a `LoadSpectrum`, or a function of the named variables that gives a torque.
-        design: makes (pinion, wheel) modifications from the named variables; traced, so it must be pure.
-        plan: the variants: `FullFactorial`, `LatinHypercube`, `Sobol` or `VariantList`.
-        results: names of `metrics.quantities`, or quantities of your own; only these are computed.
-        measures: by which torques and manufactured gears are joined, a column each; None for `Mean()` and `Worst()` of
+        torque: torque on the pinion [N m], a `LoadSpectrum`, or a function of the named variables that returns a
+            torque.
+        design: function that returns (pinion, wheel) modifications from the named variables; traced, so it must be
+            pure.
+        plan: variants: `FullFactorial`, `LatinHypercube`, `Sobol` or `VariantList`.
+        results: names of `metrics.quantities`, or your own quantities; only these are computed.
+        measures: measures over torques and manufactured gears, a column each; None for `Mean()` and `Worst()` of
             several torques, with manufactured gears `Mean()` and `Quantile(0.95)`.
-        output: folder of the table; None keeps it in memory.
+        output: folder of the table; None to keep the table in memory.
         manufactured: manufactured gears, the same for every variant; None for nominal gears.
         part_rows: variants per file, of which an interruption costs those under way; None for 64 files of at most
             131072 variants and at least as many as the devices evaluate at once, or for those of the sweep that is

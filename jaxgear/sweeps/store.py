@@ -52,8 +52,8 @@ class Store:
     """Parts of a sweep in a folder.
 
     Attributes:
-        folder: where they lie.
-        manifest: what the sweep is.
+        folder: folder of the sweep.
+        manifest: description of the sweep.
     """
 
     def __init__(self, folder: str | Path, manifest: Manifest) -> None:
@@ -68,14 +68,14 @@ class Store:
         return -(-self._variants // self._part_rows)
 
     def span(self, part: int) -> tuple[int, int]:
-        """Variants of a part: the first, and the one after the last."""
+        """Range of the variants of a part: first variant, and end (exclusive)."""
         return part * self._part_rows, min((part + 1) * self._part_rows, self._variants)
 
     def claim(self, *, leader: bool) -> None:
-        """Makes the folder that of this sweep; the leader of several processes writes the manifest.
+        """Take the folder for this sweep; the leader of several processes writes the manifest.
 
         Raises:
-            ValueError: when the folder cannot be written, holds something else, or a sweep of other settings.
+            ValueError: if the folder cannot be written, has other contents, or a sweep of other settings.
         """
         try:
             _check_folder(self.folder)
@@ -105,7 +105,7 @@ class Store:
         return [path for path in paths if not self._is_sound(path)]
 
     def clean(self, parts: range) -> None:
-        """Deletes what killed processes left, and what is unsound, of parts that are this process's to write."""
+        """Delete temporary files of killed processes and damaged files, for the parts of this process."""
         for path in sorted(self.folder.iterdir()):
             leftover, part = _LEFTOVER.fullmatch(path.name), _PART.fullmatch(path.name)
             if leftover and int(leftover[1]) in parts:

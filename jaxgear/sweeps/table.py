@@ -21,8 +21,8 @@ def smallest(parts: Iterable[Numbered], count: int) -> np.ndarray:
     """Numbers of the rows with the `count` smallest values, ascending; equal values in the order of their numbers.
 
     Args:
-        parts: row numbers and values, shape (rows,), NaN where a row does not take part.
-        count: how many.
+        parts: row numbers and values, shape (rows,), NaN for rows to be ignored.
+        count: number of rows to return.
     """
     numbers, values = np.empty(0, np.int64), np.empty(0)
     for more, new in parts:
@@ -37,12 +37,12 @@ def smallest(parts: Iterable[Numbered], count: int) -> np.ndarray:
 
 
 def front(parts: Iterable[Numbered]) -> np.ndarray:
-    """Numbers of the rows that no other row beats: none is as good everywhere and better somewhere.
+    """Numbers of the non-dominated rows (Pareto front), sorted by the first column.
 
-    Of rows with equal values the first is kept. The front is sorted by the first column.
+    Of rows with equal values the first is kept.
 
     Args:
-        parts: row numbers and values, shape (rows, two or three columns), with NaN where a row does not take part.
+        parts: row numbers and values, shape (rows, two or three columns), NaN for rows to be ignored.
     """
     numbers, values = np.empty(0, np.int64), None
     for more, new in parts:
@@ -115,13 +115,13 @@ class SweepTable:
 
     @property
     def heads(self) -> tuple[Column, ...]:
-        """The first column of every result, which of a load spectrum or a tolerance is the mean."""
+        """First column of every result; with a load spectrum or a tolerance this is the mean."""
         results = [column for column in self.columns if column.kind == "result"]
         firsts = {column.quantity.name: column for column in reversed(results)}
         return tuple(column for column in results if firsts[column.quantity.name] is column)
 
     def find(self, name: str) -> Column:
-        """The column of a name: with or without its unit, a result's own name standing for its (weighted) mean.
+        """Column of a name, with or without its unit; the name of a result alone means its (weighted) mean.
 
         Raises:
             ValueError: for an unknown column.
@@ -155,7 +155,7 @@ class SweepTable:
         return np.concatenate([batch[name] for batch in self.batches([name])])
 
     def values(self, *columns: str | Column) -> dict[Column, np.ndarray]:
-        """Whole columns by what they hold, as figures take them, each of shape (variants,).
+        """Values of whole columns by column, for figures, shape (variants,) each.
 
         Raises:
             ValueError: for an unknown column.
@@ -168,7 +168,7 @@ class SweepTable:
         return sum(int(np.sum(~batch[CONVERGED])) for batch in self.batches([CONVERGED]))
 
     def causes(self) -> dict[Status, int]:
-        """Number of failed variants by the reason, the commonest first; empty without failures or without reasons."""
+        """Number of failed variants by reason, most frequent first; empty without failures or without reasons."""
         if STATUS not in self.names:
             return {}
         counts: Counter[str] = Counter()
@@ -178,10 +178,10 @@ class SweepTable:
         return {status: count for status, count in by_status.items() if status is not Status.CONVERGED}
 
     def why(self, pairs: int | None = None) -> str:
-        """The commonest reason of failures with its remedy; "" without failures.
+        """Most frequent reason of failures with its remedy; "" without failures.
 
         Args:
-            pairs: tooth pairs of the mesh; None where they are not known.
+            pairs: number of tooth pairs of the mesh; None if unknown.
         """
         causes = self.causes()
         return explanation(causes, len(self), "variants", pairs) if causes else ""
@@ -190,8 +190,8 @@ class SweepTable:
         """The best variants, best first, without failed ones.
 
         Args:
-            count: how many at most.
-            by: column to rank by; None for the first result. Large values are better for columns that say so.
+            count: largest number of variants.
+            by: column of the ranking; None for the first result. The column defines if larger values are better.
 
         Raises:
             ValueError: for an unknown column.
@@ -201,7 +201,7 @@ class SweepTable:
         return self.take(smallest(ranked, count))
 
     def pareto(self, by: Sequence[str]) -> "SweepTable":
-        """The variants that no other variant beats in all of the columns, sorted by the first column.
+        """Pareto front of the variants in several columns, sorted by the first column.
 
         Args:
             by: two or three columns. Of variants with equal values in all of them the first is kept.
@@ -215,7 +215,7 @@ class SweepTable:
         return self.take(front(self._ranked(columns)))
 
     def take(self, numbers: Sequence[int] | np.ndarray) -> "SweepTable":
-        """Some rows, in the order of their numbers given, as a table in memory."""
+        """Table in memory of the rows with given numbers, in this order."""
         import pyarrow
 
         numbers = np.asarray(numbers, np.int64)
@@ -307,7 +307,7 @@ class SweepTable:
 
 
 def in_memory(title: str, columns: Sequence[Column], tables: Sequence[Any]) -> SweepTable:
-    """A table of Arrow tables."""
+    """Sweep table from Arrow tables in memory."""
     sizes = [len(table) for table in tables]
     return SweepTable(
         title, columns, sizes, lambda part, names: tables[part] if names is None else tables[part].select(names)
