@@ -124,8 +124,7 @@ def parametric_instability(state: LoadedMean, *, order: int = 1) -> tuple[Scalar
 
 
 def damping_threshold(state: LoadedMean, *, order: int = 1) -> Scalar:
-    """Damping ratio zeta = |h| / (2 omega_0) above which no parametric instability exists at order Omega ~ 2 omega_0.
-    """
+    """Damping ratio zeta = |h| / (2 omega_0) above which order Omega ~ 2 omega_0 has no parametric instability."""
     order = whole("order", order, 1, len(state.orders))
     return jnp.abs(_coupling(state, 2 * state.frequency / order, order)) / (2 * state.frequency)
 

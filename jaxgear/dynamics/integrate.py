@@ -102,8 +102,7 @@ def cycle_of(oscillator: Oscillator, steps: int) -> Cycle:
 
 
 def nodes_of(index: Int[Array, ""], stride: Int[Array, ""]) -> Int[Array, "3"]:
-    """Indices of the positions at the start, in the middle and at the end of a step over an even number of intervals.
-    """
+    """Indices of the positions at start, middle and end of a step over an even number of intervals."""
     return index * stride + jnp.stack([jnp.zeros_like(stride), stride // 2, stride])
 
 

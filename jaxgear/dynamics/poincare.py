@@ -1,5 +1,4 @@
-"""Poincare map of a state over mesh cycles, in scaled unknowns, and correction of a point on a branch of fixed points.
-"""
+"""Poincare map of a state over mesh cycles, in scaled unknowns, and corrected points on a branch of fixed points."""
 
 from collections.abc import Callable, Sequence
 from typing import NamedTuple, TypeVar

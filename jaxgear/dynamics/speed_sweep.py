@@ -175,8 +175,7 @@ def prepared(
     orders: Sequence[float] = ORDERS,
     kicks: Sequence[float] | jax.Array = (),
 ) -> tuple[_Sizes, _Limits]:
-    """Check the options of a sweep; returns static sizes and traced limits. Without an oscillator `steps` are needed.
-    """
+    """Check the options of a sweep; returns static sizes and traced limits. No oscillator: `steps` are needed."""
     if direction not in ("up", "down"):
         raise ValueError(f'direction = {direction!r} must be "up" or "down"')
     if not isinstance(carry, bool):

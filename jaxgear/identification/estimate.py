@@ -91,8 +91,7 @@ class Identified(Checked):
 
     @property
     def best_candidate(self) -> float | None:
-        """Further torque with the most information on the least determined combination [N m]; None without candidates.
-        """
+        """Further torque that best determines the least determined combination [N m]; None without candidates."""
         least = np.asarray(self.told_by_candidates)[:, -1:]
         return float(self.candidates[int(np.argmax(least))]) if len(least) else None
 
@@ -155,8 +154,7 @@ class Identified(Checked):
 
     @property
     def noise_orders(self) -> Float[np.ndarray, " torques"]:
-        """95 % quantile of the amplitude of a mesh order due to noise alone, for every torque [um], shape (torques,).
-        """
+        """95 % quantile of the amplitude of a mesh order due to noise alone [um], shape (torques,)."""
         mean = [
             np.sqrt(np.mean(np.square(np.asarray(self.noise)[rows])) / len(rows)) for rows in self._rows_of_torques()
         ]

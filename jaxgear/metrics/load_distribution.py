@@ -41,8 +41,7 @@ class ContactShock(Checked):
 
 @over_batch
 def load_sharing(cycle: MeshCycle) -> Float[Array, "pairs positions"]:
-    """Share of every pair in the total force, shape (pairs, positions); the sum over pairs is 1, or 0 at zero torque.
-    """
+    """Share of every pair in the total force, shape (pairs, positions); the sum is 1, or 0 at zero torque."""
     return _shares(replace(cycle, pinion=None, wheel=None))
 
 

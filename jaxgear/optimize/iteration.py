@@ -120,8 +120,7 @@ class Pressure:
     meshes: list[Mesh]
 
     def largest(self, pinion: AbstractModification, wheel: AbstractModification, cycle: MeshCycle | None) -> float:
-        """Largest pressure of flanks and tip edges [MPa]; `cycle` is the solution on the first mesh, None to solve it.
-        """
+        """Largest pressure of flanks and tip edges [MPa]; `cycle` is the solution on the first mesh or None."""
         cycles = [] if cycle is None else [cycle]
         cycles += [_solve(mesh, self.torque, pinion, wheel) for mesh in self.meshes[len(cycles) :]]
         # a contact is on the flank or at the tip edge, and zero in the other field

@@ -205,8 +205,7 @@ class Pareto(Checked):
         return met
 
     def end_on(self, mesh: Mesh, met: "Met") -> tuple["Met", bool]:
-        """Continue the designs of a front on a finer mesh; returns them, and True if the mesh is fine enough for all.
-        """
+        """Continue the designs of a front on a finer mesh; returns them, and True if the mesh is fine enough."""
         record = met.record.on(met.record.problem.on(mesh))
         finer = Met(record, met.frame())
         searches = [Search(point, Chebyshev(met.weight(value), finer.frame)) for point, value in zip(*met.rows())]

@@ -167,8 +167,7 @@ def _kept_to_limits(record: Record, polish: Polish) -> None:
 
 
 def seek_limits(linearizer: Linearizer, ledger: Ledger, point: np.ndarray) -> None:
-    """Search for designs that meet the limits, by minimizing the violation from points near `point` and over the box.
-    """
+    """Search for designs that meet the limits: minimize the violation from starts near `point` and over the box."""
     problem = linearizer.problem
     beside = points_nearby(point, _NEAR - 1, reach=_REACH, seed=0)
     nothing = NoObjective(len(problem.objectives))

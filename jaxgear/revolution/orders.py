@@ -152,8 +152,7 @@ def total_composite_error(revolution: Revolution, of: Curve | None = None) -> Fl
 
 
 def tooth_to_tooth_error(revolution: Revolution, of: Curve | None = None) -> Float[Array, "*batch"]:
-    """Tooth-to-tooth composite deviation f'_i under load: largest range of the transmission error in a base pitch [um].
-    """
+    """Tooth-to-tooth composite deviation f'_i: largest range of the transmission error in a base pitch [um]."""
     curve = revolution.transmission_error if of is None else of
     positions, places = revolution.cycles.kinematics.resolution.positions, curve.shape[-1]
     if revolution.repeats:

@@ -204,8 +204,7 @@ def mesh_patterns(gearbox: Gearbox, mesh: int, y: Slices) -> list[Patterns]:
 
 
 def load_pattern(gearbox: Gearbox, without: int | None = None) -> list[Patterns]:
-    """One pattern per shaft of all external loads and of the mesh forces, even over the faces, except mesh `without`.
-    """
+    """One pattern per shaft of all external loads and even mesh forces, except those of mesh `without`."""
     points, weights = gauss_legendre(_POINTS)
     at: list[list[Array]] = [[] for _ in gearbox.shafts]
     vectors: list[list[Array]] = [[] for _ in gearbox.shafts]

@@ -202,8 +202,7 @@ class SweepReport(SweepResult):
         yield from super().figures()
 
     def alone(self, folder: Path) -> dict[str, dict[Path, str]]:
-        """Write figures of each variant compared with the unmodified pair only; returns captions by variant and file.
-        """
+        """Write figures of each variant next to the unmodified pair only; returns captions by variant and file."""
         from .. import plot
 
         first, *others = self.evaluations

@@ -250,8 +250,7 @@ class Case(eqx.Module):
     def _dynamic_rate(
         self, cycle: MeshCycle, motion: SteadyForce, removed: RemovedMaterial, place: Deposit
     ) -> tuple[Depth, Statuses]:
-        """`_rate` under the mesh force of a motion, averaged over its mesh cycles: each tooth runs through all of them.
-        """
+        """`_rate` under the mesh force of a motion, mean over its mesh cycles: each tooth takes part in all."""
 
         def of_cycle(force):
             contact = solve_forces(self.mesh, jnp.maximum(force, 0.0), removed)
@@ -268,8 +267,7 @@ class Case(eqx.Module):
         return {"pinion": self.pinion + pinion, "wheel": self.wheel + wheel}
 
     def cycles(self, roll_length: Float[Array, "gears points"], marched: March) -> MeshCycle:
-        """Mesh cycles on the flanks at all time steps, leading axis (steps,); (steps, torques) under a load spectrum.
-        """
+        """Mesh cycles at all time steps, leading axis (steps,); (steps, torques) under a load spectrum."""
 
         def under(flanks, load: OperatingPoint, found) -> MeshCycle:
             return MeshCycle(

@@ -35,8 +35,7 @@ def _at_most(longest, history):
 
 
 def _pressure_error(history: WearHistory):
-    """Estimated error of the largest pressure over a wear history [MPa]; pressures at tip corners have no grid error.
-    """
+    """Estimated error of the largest pressure over a wear history [MPa]; tip corners have no grid error."""
     largest = over_life(history, "max_contact_pressure")
     may_be = jnp.maximum(largest, over_life(history, "max_flank_pressure") + pressure_error(history))
     return maximum(may_be) - maximum(largest)
