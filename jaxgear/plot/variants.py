@@ -373,12 +373,11 @@ def radar(
     *,
     note: str = "",
 ) -> np.ndarray:
-    """One radar chart per variant, each spoke from the worst value of the variants shown, inside, to the best one.
+    """One radar chart per variant; each spoke extends from the worst value of the variants (inside) to the best one.
 
-    Where they differ by less than a fifth, the inner ring is a fifth from the best.
-
-    So the larger the area, the better the variant. Its values stand at the spokes, the best ones of all charts in bold;
-    the first variant is drawn into every chart for comparison.
+    If the values differ by less than a fifth, the inner ring is a fifth from the best value. A larger area means a
+    better variant. The values are printed at the spokes, the best of all charts in bold; the first variant is drawn
+    into every chart for comparison.
 
     Args:
         table: values of every variant by what they are, a `Quantity` or a column of a sweep: the results on the spokes,
@@ -386,7 +385,7 @@ def radar(
         variants: row numbers of the variants; None for all rows, of which a page holds about nine.
         names: of the variants; None for their row numbers.
         ax: one polar Axes per variant; None for a new figure.
-        note: what all values have in common, such as "mean over torques"; it stands under the charts.
+        note: text below the charts that applies to all values, such as "mean over torques".
 
     Returns:
         the Axes, one per variant.

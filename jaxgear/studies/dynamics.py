@@ -44,12 +44,13 @@ _BESIDE = 4  # number of speeds on each side of a peak that are repeated with a 
 def branches_of(
     oscillator: Oscillator, runs: Mapping[str, SpeedResponse], steps: tuple[int, ...], step: float = _STEP
 ) -> list[Branch]:
-    """The branch of the lowest speed, and those that falling runs begin on, each once.
+    """Branches of periodic orbits through the lowest speed and through the first speeds of falling runs, without
+    repeats.
 
     Args:
         oscillator: one oscillator.
-        runs: by name.
-        steps: of the integrator per mesh cycle, at every speed.
+        runs: speed responses by the name of the run.
+        steps: steps of the integrator per mesh cycle at every speed.
         step: first one along a branch.
     """
     found: list[Branch] = []
