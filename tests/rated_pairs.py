@@ -8,8 +8,9 @@ import jax.numpy as jnp
 import numpy as np
 
 import jaxgear as jg
+from jaxgear.geometry.path import path_between
 from jaxgear.metrics import Lubricant
-from jaxgear.numerics import changed, real
+from jaxgear.numerics import changed, quick_jit, real
 from jaxgear.rating import GearRating, Rating, rate
 
 
@@ -81,9 +82,16 @@ EXAMPLE_1 = Case(
 )  # fmt: skip
 
 
-@jax.jit
+def unlimited(pair: jg.GearPair):
+    """Path of contact up to the tips; form circles, which do not limit it, take long to compile."""
+    none = jnp.zeros_like(pair.pinion.module)
+    return path_between(pair.pinion, pair.wheel, pair.center_distance, (none, none))
+
+
+@quick_jit
 def _rated(case):
-    return rate(jg.GearPair(*case.gears, case.center_distance), case.torque, case.speed, case.rating)
+    pair = jg.GearPair(*case.gears, case.center_distance)
+    return rate(pair, case.torque, case.speed, case.rating, path=unlimited(pair))
 
 
 def rated(case: Case):

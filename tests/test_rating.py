@@ -4,7 +4,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from rated_pairs import FZG_C, STAGE_3, rated, with_rating
+from rated_pairs import FZG_C, STAGE_3, rated, unlimited, with_rating
 
 import jaxgear as jg
 from jaxgear.contact.status import Status
@@ -108,7 +108,7 @@ def test_work_hardening_is_of_the_soft_gear_alone():
         STAGE_3.rating.wheel, pitting_limit=None, heat_treatment="through_hardened", hardness=jnp.asarray(240.0)
     )
     rating = changed(STAGE_3.rating, wheel=soft)
-    found = flank_factors(PAIR, KS3.geometry, STAGE_3.speed, rating)
+    found = flank_factors(PAIR, jg.path_of_contact(PAIR), KS3.geometry, STAGE_3.speed, rating)
     assert np.allclose(found.work_hardening, [1.0, 1.2 - 110 / 1700])  # R_zH is below 3
     assert np.allclose(found.static_work_hardening, [1.0, 1.05 - 110 / 6800])
     # the film of both gears is that of the softer one
@@ -219,7 +219,7 @@ def safeties(values):
     gears = {"pinion": changed(given.pinion, flank_roughness_rz=of["roughness"], pitting_limit=of["limit"])}
     gears |= {"wheel": given.wheel, "lubricant": changed(given.lubricant, viscosity_40=of["viscosity"])}
     rating = changed(given, application_factor=of["application"], service_life=of["life"], **gears)
-    found = rate(pair, of["torque"], of["speed"], rating)
+    found = rate(pair, of["torque"], of["speed"], rating, path=unlimited(pair))
     return jnp.concatenate(
         [found.pitting.safety, found.bending.safety, found.pitting.static_safety, found.bending.static_safety]
     )

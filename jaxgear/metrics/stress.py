@@ -67,7 +67,7 @@ def nominal_stress_squares(pair: GearPair, path: PathOfContact) -> tuple[Scalar,
     """Squares of `nominal_contact_stress` per line load along the line of action, pinion and wheel [MPa^2 mm/N]."""
     factors = contact_factor_squares(pair, path)
     normal = factors.contact_ratio * factors.elasticity * factors.helix_angle * jnp.cos(pair.pinion.base_helix_angle)
-    at_pitch = normal / path.reduced_radius(jnp.zeros(()))
+    at_pitch = normal / path.reduced_radius(jnp.zeros_like(path.end))
     return at_pitch * factors.pinion_single_pair, at_pitch * factors.wheel_single_pair
 
 
@@ -93,21 +93,26 @@ class ContactFactors(NamedTuple):
 def contact_factor_squares(pair: GearPair, path: PathOfContact) -> ContactFactors:
     """The factors of `nominal_contact_stress` that belong to a pair, whatever its load."""
     overlap = jnp.minimum(pair.overlap_ratio, 1.0)
-    pitch = path.reduced_radius(jnp.zeros(()))
+    pitch = path.reduced_radius(jnp.zeros_like(path.end))
     inner, outer = (pitch / path.reduced_radius(single) for single in (path.inner_single, path.outer_single))
     inner, outer = (jnp.maximum(single, 1.0) for single in (inner, outer))
     if pair.pinion.helix_angle is not None:
         inner, outer = ((1 + (1 - overlap) * (jnp.sqrt(square) - 1)) ** 2 for square in (inner, outer))
     cosine = jnp.cos(pair.pinion.transverse_pressure_angle)
-    sharing = jnp.maximum(4 - path.contact_ratio, 0.0) / 3
     return ContactFactors(
         zone=2 * jnp.cos(pair.pinion.base_helix_angle) / (cosine**2 * jnp.tan(pair.working_pressure_angle)),
         elasticity=combined_modulus(pair.pinion.material, pair.wheel.material, "strain") / jnp.pi,
-        contact_ratio=sharing * (1 - overlap) + overlap / path.contact_ratio,
+        contact_ratio=contact_ratio_square(path.contact_ratio, overlap),
         helix_angle=1 / pair.pinion.helix_cosine,
         pinion_single_pair=inner,
         wheel_single_pair=outer,
     )
+
+
+def contact_ratio_square(contact_ratio: Scalar, overlap_ratio: Scalar) -> Scalar:
+    """Z_eps^2 = (4 - eps_alpha) / 3 (1 - eps_beta) + eps_beta / eps_alpha, eps_beta at most 1."""
+    overlap = jnp.minimum(overlap_ratio, 1.0)
+    return jnp.maximum(4 - contact_ratio, 0.0) / 3 * (1 - overlap) + overlap / contact_ratio
 
 
 Real = Float[Array, "..."]

@@ -8,7 +8,7 @@ from jaxtyping import Array, Float
 from ..conditions import LoadSpectrum
 from ..geometry import GearPair, PathOfContact, path_of_contact
 from ..metrics.safety import safety_factor
-from ..numerics import Checked, Given, check, program, result
+from ..numerics import Checked, Given, check, on_both, program, result
 from .flank import FlankFactors, flank_factors, flank_life_factors, flank_lines
 from .life import SNLine, equivalent_torque, safety
 from .load_factors import LoadFactors, load_factors
@@ -160,7 +160,8 @@ def _rate(
     path = path_of_contact(pair) if path is None else path
     geometry = mesh_geometry(pair, path)
     factors = load_factors(pair, geometry, torque, speed, rating, **given)
-    flank, root = flank_factors(pair, geometry, speed, rating), bending_factors(pair, path, geometry, rating)
+    flank = flank_factors(pair, path, geometry, speed, rating)
+    root = bending_factors(pair, path, geometry, rating)
     lines = flank_lines(flank, rating), bending_lines(root, rating)
     spectrum = None
     if rating.loads is not None:
@@ -218,7 +219,7 @@ def _verdict(of, nominal, stress, life, lines, cycles, required, power, spectrum
     if spectrum is not None:
         in_bins = (spectrum.contact_stress, spectrum.root_stress)[of]
         largest = jnp.max(in_bins, axis=1)
-        reached = jnp.stack([safety(line, *each) for line, *each in zip(lines, in_bins, spectrum.cycles)])
+        reached = jnp.stack(on_both(lambda of_gear: safety(*of_gear), *zip(lines, in_bins, spectrum.cycles)))
         damage = jnp.sum((spectrum.pitting_damage, spectrum.root_damage)[of], axis=1)
     on_torque = (reached / required) ** (_STEPS if of == 0 else 1)
     return Verdict(

@@ -7,8 +7,8 @@ References:
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ..compliance.plane import combined_modulus
-from ..geometry import GearPair
+from ..geometry import GearPair, PathOfContact
+from ..metrics.stress import contact_factor_squares
 from ..numerics import Checked, Given, result
 from .life import SNLine, life_factor, strength_line
 from .materials import PITTING_PERMITTED, Knees
@@ -73,7 +73,9 @@ class FlankFactors(Checked):
         return self.lubricant * self.velocity * self.roughness * self.work_hardening * self.size
 
 
-def flank_factors(pair: GearPair, geometry: MeshGeometry, speed: Given, rating: Rating) -> FlankFactors:
+def flank_factors(
+    pair: GearPair, path: PathOfContact, geometry: MeshGeometry, speed: Given, rating: Rating
+) -> FlankFactors:
     """Factors of the contact stress and of its permissible value, at a speed of the pinion [rpm].
 
     Raises:
@@ -82,25 +84,21 @@ def flank_factors(pair: GearPair, geometry: MeshGeometry, speed: Given, rating: 
     oil = rating.lubricant
     if oil is None:
         raise ValueError("Z_L needs the lubricant, its viscosity at 40 degC")
-    working, transverse = geometry.working_pressure_angle, geometry.transverse_pressure_angle
-    overlap = jnp.minimum(geometry.overlap_ratio, 1.0)
-    cosine = jnp.cos(geometry.helix_angle)
+    squares, overlap = contact_factor_squares(pair, path), jnp.minimum(geometry.overlap_ratio, 1.0)
     softer = jnp.minimum(*(gear.pitting_strength for gear in rating.gears))
     way = jnp.clip((softer - _LIMITS[0]) / (_LIMITS[1] - _LIMITS[0]), 0.0, 1.0)
     on_film, on_roughness = (low + (high - low) * way for low, high in (_LUBRICANT, _ROUGHNESS))
     on_speed = on_film + _VELOCITY_ABOVE
     velocity = geometry.reference_speed(speed)
-    radius = geometry.reduced_radius(jnp.zeros_like(working))
+    radius = geometry.reduced_radius(jnp.zeros_like(overlap))
     first, second = (gear.flank_roughness[0] for gear in rating.gears)
     relative = 0.5 * (first + second) * (_REFERENCE_RADIUS / radius) ** (1 / 3)
     hardening = [_work_hardening(of, geometry, rating, radius, velocity) for of in (0, 1)]
     return FlankFactors(
-        zone=jnp.sqrt(2 * jnp.cos(geometry.base_helix_angle) / (jnp.cos(transverse) ** 2 * jnp.tan(working))),
-        elasticity=jnp.sqrt(combined_modulus(pair.pinion.material, pair.wheel.material, "strain") / jnp.pi),
-        contact_ratio=jnp.sqrt(
-            jnp.maximum(4 - geometry.contact_ratio, 0.0) / 3 * (1 - overlap) + overlap / geometry.contact_ratio
-        ),
-        helix_angle=1 / jnp.sqrt(cosine),
+        zone=jnp.sqrt(squares.zone),
+        elasticity=jnp.sqrt(squares.elasticity),
+        contact_ratio=jnp.sqrt(squares.contact_ratio),
+        helix_angle=jnp.sqrt(squares.helix_angle),
         single_pair=_single_pair_factors(geometry, rating, overlap),
         lubricant=on_film + 4 * (1 - on_film) / (1.2 + 134 / oil.viscosity_40) ** 2,
         velocity=on_speed + 2 * (1 - on_speed) / jnp.sqrt(0.8 + 32 / velocity),

@@ -15,6 +15,7 @@ from jaxtyping import Array, Float
 from ..compliance.iso_6336 import single_stiffness
 from ..contact.status import Status, Statuses, status_of
 from ..geometry import Gear, GearPair
+from ..metrics.stress import contact_ratio_square
 from ..numerics import Checked, Given, real, result
 from ..shafts import root_face_load_factor, tooth_height
 from ..tolerance import ToleranceClass
@@ -211,8 +212,7 @@ def transverse_load_factors(geometry: MeshGeometry, moved: Given) -> tuple[Scala
     along, total = geometry.contact_ratio, geometry.total_contact_ratio
     above = jnp.maximum(total, 2.0)
     factor = (0.9 + 0.4 * jnp.sqrt(2 * (above - 1) / above) * moved) * jnp.minimum(total, 2.0) / 2
-    overlap = jnp.minimum(geometry.overlap_ratio, 1.0)
-    sharing = jnp.maximum(4 - along, 0.0) / 3 * (1 - overlap) + overlap / along  # Z_eps^2
+    sharing = contact_ratio_square(along, geometry.overlap_ratio)
     contact, root = (jnp.clip(factor, 1.0, total / limit) for limit in (along * sharing, 0.25 * along + 0.75))
     return contact, root
 
