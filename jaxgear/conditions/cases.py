@@ -161,7 +161,7 @@ class Conditions(Checked):
 
     @property
     def count(self) -> int:
-        """Contact analyses per design."""
+        """Number of cases, contact analyses per design."""
         return len(self.load.torques) * self.samples
 
     def on(self, mesh: Mesh) -> "Cases":
@@ -199,7 +199,7 @@ class Cases(Checked):
 
     @property
     def count(self) -> int:
-        """Contact analyses per design."""
+        """Number of cases, contact analyses per design."""
         return len(self.torque) * self.samples
 
     @property

@@ -29,7 +29,7 @@ def loaded_te(clearance: AbstractMeshForce, load: Scalar) -> Scalar:
 
 
 class DimensionlessForce(AbstractMeshForce):
-    """[1 + sum_j B_j cos(2 pi j phase + phi_j)] f(x - C(phase)); every number dimensionless.
+    """Dimensionless mesh force [1 + sum_j B_j cos(2 pi j phase + phi_j)] f(x - C(phase)).
 
     Attributes:
         clearance: f, `DeadZone()` or a `PolynomialClearance`.

@@ -25,7 +25,7 @@ class Resonance(Checked):
         frequency: Omega, shape (frequencies,).
         amplitude: A, smallest first, NaN where there are fewer solutions; shape (solutions, frequencies). Up to five at
             `primary_resonance` and `super_harmonic_resonance`.
-        stable: likewise; False for NaN.
+        stable: True for stable solutions, False for NaN, shape (solutions, frequencies).
     """
 
     frequency: Curve = result()

@@ -48,7 +48,7 @@ class ToothProfile(Checked):
 
 
 def with_profile(gear: Gear, profile: ToothProfile) -> Gear:
-    """The gear with tip and root of a drawing in place of its own.
+    """Copy of a gear with tip and root of a drawing.
 
     Equations: d_f = d - 2 m_n (h_fP - x_E), of a cutter 2 a_0 - d_a0; d_Ff as in `outline`, with 1 - sin(alpha_n)
         times rho_fP (ISO 21771); d_Fa = d_a - 2 h_K.

@@ -38,7 +38,7 @@ class Toothed(Protocol):
 
 
 def involute(tangent: Real) -> Real:
-    """inv(alpha) [rad] from tan(alpha)."""
+    """Involute function inv(alpha) [rad] from tan(alpha)."""
     return tangent - jnp.arctan(tangent)
 
 

@@ -15,7 +15,7 @@ class Material(Checked):
     Attributes:
         elastic_modulus: Young's modulus [MPa].
         poisson_ratio: Poisson's ratio.
-        density: [kg/m^3].
+        density: density [kg/m^3].
         thermal_contact_coefficient: sqrt(conductivity * density * specific heat) [N/(m s^0.5 K)], used for the flash
             temperature (ISO/TS 6336-20).
     """

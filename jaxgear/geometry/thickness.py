@@ -329,7 +329,7 @@ class ToothThickness(Checked):
 
 
 def with_thickness(gear: Gear, thickness: ToothThickness) -> Gear:
-    """The gear with a tooth thickness in place of its own.
+    """Copy of a gear with another tooth thickness.
 
     Raises:
         ValueError: for a measure that is not one of this gear, or of a tooth thicker than the rack makes it.

@@ -287,7 +287,7 @@ class IdentificationResult(AbstractStudyResult):
         ]
 
     def failures(self) -> Iterator[str]:
-        """A line where the search did not end, or its estimates make no flank."""
+        """Lines if the search has not converged, or if its estimates are no valid modification."""
         if not bool(self.found.converged):
             yield "NOT CONVERGED: do not use the estimates. Narrow the ranges or raise resolution.pairs."
         try:
@@ -296,7 +296,7 @@ class IdentificationResult(AbstractStudyResult):
             yield f"NO DESIGN FILE: the estimates make no flank: {problem(error)}"
 
     def inputs(self) -> dict[str, Any]:
-        """The torques."""
+        """Torques of the readings [N m], as plain data."""
         return {UnitKey("torques", "N m"): self.found.torques}
 
     def summary(self) -> dict[str, Any]:
@@ -352,7 +352,7 @@ class IdentificationResult(AbstractStudyResult):
         return {"prior": self.design.design(before), "identified": self._flanks()}
 
     def write(self, folder: Path) -> None:
-        """The unknowns as CSV, and the pair with the estimates as design file, flanks and files of other formats."""
+        """Write the unknowns as CSV, and the identified pair as design file, flanks and files of other formats."""
         unknowns = ((name, *row) for name, row in self._rows().items())
         write_csv(folder / "identified.csv", ("name", *(record.key for record in _UNKNOWN)), unknowns)
         for gear, columns in self.found.single_pitch.items():

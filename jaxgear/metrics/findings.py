@@ -102,7 +102,7 @@ class Finding(NamedTuple):
 
     @property
     def number(self) -> str:
-        """The value with its unit."""
+        """Text of the value with its unit."""
         return self.usual.text(self.value)
 
     def __str__(self) -> str:

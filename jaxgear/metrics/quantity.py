@@ -110,7 +110,7 @@ class Quantity(eqx.Module):
 
     @property
     def words(self) -> str:
-        """The label, or else the name in words."""
+        """Label of the quantity, or its name in words."""
         return self.label or self.name.replace("_", " ")
 
     @property
@@ -260,7 +260,7 @@ class Vocabulary(Mapping[str, Quantity]):
         return len(self._known)
 
     def every(self, name: object) -> tuple[Quantity, ...]:
-        """The quantities of a name in either spelling, by different settings; none for an unknown one."""
+        """All quantities of a name in either spelling, one per class of settings; empty if unknown."""
         found = self._find(name)
         return () if found is None else (found, *self._others.get(found.name, ()))
 

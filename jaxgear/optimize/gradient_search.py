@@ -57,7 +57,7 @@ class Adam(Checked, AbstractSearch):
     steps: int = count(low=len(STAGE_WIDTHS), default=300)
 
     def search(self, problem: Problem, record: Record) -> None:
-        """Runs the stages."""
+        """Run all stages and store the best design in the record."""
         points = real_points(problem, start_points(problem, self.starts))
         scale = real_points(problem, _scale(record.judge(points)))
         stages = max(self.steps // _LONGEST, len(STAGE_WIDTHS))
@@ -103,7 +103,7 @@ class LBFGS(Checked, AbstractSearch):
     steps: int = count(low=len(STAGE_WIDTHS), default=150)
 
     def search(self, problem: Problem, record: Record) -> None:
-        """Runs the stages."""
+        """Run all stages and store the best design in the record."""
         points = start_points(problem, self.starts)
         scale, steps = _scale(record.judge(points)), self.steps // len(STAGE_WIDTHS)
         for stage, width in enumerate(STAGE_WIDTHS):

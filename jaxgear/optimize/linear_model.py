@@ -211,7 +211,7 @@ class LinearModel:
 
     @property
     def merit(self) -> float:
-        """Objective plus penalty."""
+        """Objective plus penalty times violation at the point."""
         return self.value + self.penalty * self.violation
 
     def best_step(self, radius: float) -> Step:

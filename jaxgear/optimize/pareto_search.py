@@ -60,7 +60,7 @@ class Met:
         return len(self._values) > 0
 
     def spend(self, designs: int, *, analyses: int) -> None:
-        """Counts contact analyses."""
+        """Count contact analyses of a number of designs."""
         self.record.spend(designs, analyses=analyses)
 
     def take(self, point: np.ndarray, model: LinearModel) -> None:

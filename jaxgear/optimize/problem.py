@@ -73,7 +73,7 @@ class Roughness(eqx.Module):
 
 
 def unmodified(parameters: Parameters) -> Modifications:
-    """Design of nominal involutes."""
+    """Default design without variables: nominal involutes."""
     return None, None
 
 

@@ -182,7 +182,7 @@ class _Judging:
         self._record = record
 
     def spend(self, designs: int, *, analyses: int) -> None:
-        """Counts contact analyses."""
+        """Count contact analyses of a number of designs."""
         self._record.spend(designs, analyses=analyses)
 
     def take(self, point: np.ndarray, model: LinearModel) -> None:

@@ -63,7 +63,7 @@ class Limit(Checked):
         return f"{self.value:.4g} {self.unit}".rstrip() + f", {state}: {' and '.join(limits)}"
 
     def summary(self) -> dict[str, Any]:
-        """Plain numbers."""
+        """Values as plain data, for a table or a file."""
         return {"value": self.value, "low": self.low, "high": self.high, "unit": self.unit, "met": self.kept}
 
 
@@ -82,7 +82,7 @@ class Rounding(Checked):
     objective: float
 
     def summary(self) -> dict[str, Any]:
-        """Plain numbers."""
+        """Values as plain data, for a table or a file."""
         return {"steps": self.steps, "parameters_before": self.parameters, "objective_before": self.objective}
 
 

@@ -97,10 +97,10 @@ def waterfall(
     """Campbell diagram: amplitudes of the spectrum along the multiples of the mesh frequency, over the mesh frequency.
 
     Args:
-        response: of one run.
+        response: speed response of one run.
         of: spectrum of the mesh force or of the velocity of the DTE.
         ax: Axes to draw into; None for a new figure.
-        title: over the Axes and the legend.
+        title: title above the Axes and the legend.
         most: amplitude at the upper end of the colours [N or mm/s], for Axes that are to be compared; None for the
             largest of this response.
     """
@@ -148,10 +148,10 @@ def order_tracks(
     """Levels of orders of the mesh force over the mesh frequency: rms values re 1 uN (ISO 1683), the upper 60 dB.
 
     Args:
-        response: of one run.
-        orders: multiples of the mesh frequency; those that the response lacks, or that are nowhere, are left out.
+        response: speed response of one run.
+        orders: multiples of the mesh frequency; orders without amplitudes in the response are left out.
         ax: Axes to draw into; None for a new figure.
-        title: over the Axes and the legend.
+        title: title above the Axes and the legend.
     """
     frequency, known = np.asarray(response.mesh_frequency), list(response.orders)
     levels = np.asarray(response.force_levels)
@@ -191,7 +191,7 @@ def bifurcation(responses: Runs, ax: Axes | None = None, *, title: str = "") -> 
     Args:
         responses: of one or several runs, by what the legend says of each; in a sequence each has its direction.
         ax: Axes to draw into; None for a new figure.
-        title: over the Axes and the legend.
+        title: title above the Axes and the legend.
     """
     with report_axes(ax) as ax:
         for index, (run, response) in enumerate(_named(responses)):
@@ -217,11 +217,11 @@ def branches(
     """Response curve of branches of orbits over the mesh frequency: stable and unstable parts, and bifurcations.
 
     Args:
-        found: of one oscillator.
-        of: which number: the dynamic factor or the rms of the DTE about its mean.
+        found: branches of one oscillator.
+        of: quantity: the dynamic factor or the rms of the DTE about its mean.
         ax: Axes to draw into; None for a new figure.
         responses: runs through the speeds, whose steady states are marked.
-        title: over the Axes and the legend.
+        title: title above the Axes and the legend.
     """
     names: dict[str, None] = {}
 

@@ -112,7 +112,7 @@ def line_style(index: int) -> dict[str, Any]:
 
 
 def marker_style(index: int) -> dict[str, Any]:
-    """`line_style` with a marker on every point."""
+    """Colour, dashes, line width and marker of a style, by its index."""
     return {**line_style(index), "marker": _MARKERS[index % len(_MARKERS)], "markersize": 3.5}
 
 
@@ -148,9 +148,9 @@ def report_axes(
 
     Args:
         ax: Axes, an array of them for several panels, or None.
-        columns: number of panels side by side with a common ordinate; several give an array of Axes.
-        rows: number of panels on top of each other with a common abscissa, likewise.
-        width, height: of a new figure [mm].
+        columns: number of panels side by side with a common ordinate; several panels give an array of Axes.
+        rows: number of panels on top of each other with a common abscissa; several panels give an array of Axes.
+        width, height: size of a new figure [mm].
     """
     if ax is not None:
         yield ax
@@ -356,7 +356,7 @@ def text_above(ax: Axes, x: float, text: str) -> None:
 
 
 def save(fig: Figure, path: str | Path) -> Path:
-    """Writes a figure as PNG at 200 dpi, cut to its contents, and closes it.
+    """Write a figure as PNG at 200 dpi, cut to its contents, and close it.
 
     Args:
         fig: the figure, `ax.figure` of the Axes that a plot function returned.

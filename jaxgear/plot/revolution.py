@@ -50,7 +50,7 @@ def order_spectrum(
         teeth: that it was solved for.
         ax: Axes to draw into; None for a new figure.
         harmonics: of the mesh that are shown.
-        title: of the Axes.
+        title: title of the Axes.
     """
     amplitude = amplitudes(found.transmission_error)
     order = np.arange(len(amplitude)) * found.teeth[0] / found.windows

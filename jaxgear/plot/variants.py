@@ -100,11 +100,11 @@ def response_surface(
 
     Args:
         phase: mesh positions of one base pitch, shape (positions,).
-        torques: on the pinion [N m], such as up to twice the design torque; shape (torques,).
+        torques: torques on the pinion [N m], such as up to twice the design torque; shape (torques,).
         te: transmission error [um], shape (torques, positions).
         unloaded: transmission error at vanishing load [um], shape (positions,).
         ax: Axes to draw into; None for a new figure.
-        design_torque: [N m], drawn as a line; None for none.
+        design_torque: design torque [N m], drawn as a line; None for none.
         design: name of the design, for a title; None for none.
     """
     torques, te = np.asarray(torques, float), np.asarray(te, float)
@@ -233,10 +233,10 @@ def ppte_over_torque(
     """PPTE [um] of several designs over the torque, with the torque they were designed for.
 
     Args:
-        torques: on the pinion [N m], shape (torques,).
+        torques: torques on the pinion [N m], shape (torques,).
         curves: PPTE [um] by the name of the design, each of shape (torques,).
         ax: Axes to draw into; None for a new figure.
-        design_torque: [N m]; None for no mark.
+        design_torque: design torque [N m]; None for no mark.
     """
     with report_axes(ax) as ax:
         _over_torque(ax, torques, curves, design_torque)
@@ -273,10 +273,10 @@ def face_load_over_torque(
     """Face load factor K_Hbeta of several designs over the torque; 1 is a load that is even over the face.
 
     Args:
-        torques: on the pinion [N m], shape (torques,).
+        torques: torques on the pinion [N m], shape (torques,).
         curves: `metrics.face_load_factor` by the name of the design, each of shape (torques,).
         ax: Axes to draw into; None for a new figure.
-        design_torque: [N m]; None for no mark.
+        design_torque: design torque [N m]; None for no mark.
     """
     with report_axes(ax) as ax:
         _over_torque(ax, torques, curves, design_torque)
@@ -317,7 +317,7 @@ def harris_map(
 
     Args:
         phase: mesh positions of one base pitch, shape (positions,).
-        torques: on the pinion [N m], shape (torques,).
+        torques: torques on the pinion [N m], shape (torques,).
         te: transmission error [um], shape (torques, positions).
         ax: Axes to draw into; None for a new figure.
         design: name of the design, for a title; None for none.

@@ -27,7 +27,7 @@ def worn_flank(life: WearHistory, gear: Literal["pinion", "wheel"], ax: Axes | N
         life: wear history of the pair.
         gear: "pinion" or "wheel".
         ax: Axes to draw into; None for a new figure.
-        title: of the Axes.
+        title: title of the Axes.
 
     Raises:
         ValueError: for another gear.

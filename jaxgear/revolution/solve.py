@@ -50,7 +50,7 @@ class Revolution(WithStatus, eqx.Module):
 
     @property
     def windows(self) -> int:
-        """Number of base pitches."""
+        """Number of windows of one base pitch."""
         return self.cycles.transmission_error.shape[-2]
 
     @property

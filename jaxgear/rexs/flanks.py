@@ -69,7 +69,7 @@ class _Rise(NamedTuple):
         return self.end in FACES
 
     def end_place(self, frame: Frame) -> float:
-        """Place of the end."""
+        """Place of the end of the flank [mm]."""
         return {"tip": frame.tip, "root": -frame.start}.get(self.end, 0.5 * frame.width)
 
     def written(self, frame: Frame, place: float) -> Any:
@@ -103,7 +103,7 @@ class _Rise(NamedTuple):
         return self.end_place(frame) if found is None else found
 
     def relief(self, frame: Frame, amount: float, length: float, curve: AbstractCurve) -> AbstractModification:
-        """The relief at this end of the flank."""
+        """Relief of the library at this end of the flank: amount [um], length [mm], curve."""
         numbers = real(amount), real(length), curve
         if self.on_face:
             return EndRelief(*numbers, side=frame.side(self.end))
@@ -219,7 +219,7 @@ def _points(term: AbstractModification, frame: Frame, owner: str, error: float) 
 
 
 def read_modification(component: Component, frame: Frame) -> Iterator[AbstractModification]:
-    """The modifications that a component describes.
+    """Modifications of the library from a component.
 
     Raises:
         DesignFileError: for missing or unsupported attributes.

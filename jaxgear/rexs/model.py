@@ -93,7 +93,7 @@ class Component:
         return f"{self.type} {self.id}" + (f": {attribute}" if attribute else "")
 
     def refuse(self, attribute: str, problem: str) -> DesignFileError:
-        """Error for an attribute."""
+        """Error with a message for an attribute of the component."""
         return DesignFileError(self.where(attribute), problem)
 
     def missing(self, attribute: str) -> DesignFileError:
@@ -111,14 +111,14 @@ class Component:
         return self._float(attribute, value, unit, shift)
 
     def needed(self, attribute: str, unit: str) -> float:
-        """Required number."""
+        """Number of a required attribute in a unit; raises if it is missing."""
         value = self.number(attribute, unit)
         if value is None:
             raise self.missing(attribute)
         return value
 
     def numbers(self, attribute: str, unit: str, *, shift: int = 0) -> np.ndarray:
-        """Required array, times 10^shift."""
+        """Numbers of a required array attribute in a unit, times 10^shift."""
         value = self._value(attribute, unit)
         if value is None:
             raise self.missing(attribute)
@@ -137,7 +137,7 @@ class Component:
         return str(value)
 
     def flag(self, attribute: str, default: bool) -> bool:
-        """True or false."""
+        """Boolean attribute, or its default if absent."""
         return self.choice(attribute, str(default).lower(), ("true", "false")) == "true"
 
     def text(self, attribute: str) -> str:
@@ -218,7 +218,7 @@ class Model:
         return component
 
     def relate(self, kind: str, *, order: int | None = None, **roles: Component) -> None:
-        """Add a relation."""
+        """Add a relation of components by their roles."""
         self.relations.append(Relation(kind, tuple((role, part.id) for role, part in roles.items()), order))
 
     def under_load(self, case: int, component: Component, **values: tuple[Any, str]) -> None:
@@ -397,7 +397,7 @@ def _shift(text: str, shift: int) -> str:
 
 
 def decoded(text: str, code: str) -> tuple[str, ...]:
-    """The numbers of an array in base64, little-endian (REXS 1.4).
+    """Numbers of an array in base64, little-endian (REXS 1.4).
 
     Raises:
         ValueError: where it is none.

@@ -1,4 +1,4 @@
-"""Writes a gear pair with its modifications, its load and what a loaded tooth contact has found as a REXS file."""
+"""Write a gear pair with its modifications, its load and the results of its contact analysis as a REXS file."""
 
 from pathlib import Path, PurePath
 from typing import Any

@@ -36,7 +36,7 @@ class RigidSupport(AbstractSupport):
 
     @property
     def pair(self) -> GearPair:
-        """`gears`."""
+        """Gear pair of the support."""
         return self.gears
 
     @property
@@ -90,7 +90,7 @@ class TabulatedSupport(AbstractSupport):
 
     @property
     def pair(self) -> GearPair:
-        """`gears`."""
+        """Gear pair of the support."""
         return self.gears
 
     @property

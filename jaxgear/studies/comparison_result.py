@@ -90,7 +90,7 @@ class ComparisonResult(AbstractStudyResult):
         return {name: {key: of.factors[key] for key in FACTORS} for name, of in self.evaluations.items()}
 
     def write(self, folder: Path) -> None:
-        """The flanks of all designs as `flanks.csv`, and what tables of the file add to them."""
+        """Write the flanks of all designs to `flanks.csv`, and what tables of the file add to them."""
         write_flanks(folder / "flanks.csv", self.mesh, side_by_side.flanks(self.evaluations))
         for name, part in self.parts.items():
             if part.lines:
@@ -120,7 +120,7 @@ class ComparisonResult(AbstractStudyResult):
         yield from manufactured.figures(self.evaluations)
 
     def tables(self) -> Iterator[Table]:
-        """The designs side by side, and what tables of the file add."""
+        """Tables of the designs side by side, and of further tables of the file."""
         yield side_by_side.table(self.design, self.evaluations)
         for part in self.parts.values():
             yield from part.tables

@@ -218,7 +218,7 @@ class DynamicsResult(AbstractStudyResult):
                 )
 
     def inputs(self) -> dict[str, Any]:
-        """Torques, speeds, settings, equivalent mass and model."""
+        """Torques [N m], speeds [Hz], settings, equivalent mass [kg] and model, as plain data."""
         given = fields_data(self.settings)
         frequencies = np.asarray(given.pop("mesh_frequencies"))
         return {

@@ -97,7 +97,7 @@ class ExportResult(AbstractStudyResult):
             yield f"NOT CONVERGED: {self.name}, {cause}; the tables are not written. {help_}"
 
     def inputs(self) -> dict[str, Any]:
-        """Torques and equivalent mass."""
+        """Torques [N m] and equivalent mass [kg], as plain data."""
         return {
             UnitKey("torque", "N m"): self.mesh.torque,
             UnitKey("torques", "N m"): self.mesh.torques,

@@ -71,7 +71,7 @@ def pages(design: DesignFile, evaluations: Evaluations) -> Iterator[Chapter]:
 
 
 def summary(evaluation: Evaluation) -> dict[str, Any]:
-    """The scatter of a design as plain data."""
+    """Scatter of a design over manufactured gears, as plain data; empty without a scatter."""
     return {} if evaluation.scatter is None else {"manufactured": numbers_of(_RECORDS, evaluation.scatter)}
 
 

@@ -356,7 +356,7 @@ class OptimizationResult(ComparisonResult):
         yield mounting(self.design)
 
     def details(self) -> Iterator[str]:
-        """The search: iterations, projection, first-order optimality and number of analyses."""
+        """Lines on the search: iterations, projection, first-order optimality and number of analyses."""
         optimum, front = self.optimum, self.front
         if optimum.objective_name.endswith(PENALIZED):  # no other design has the penalty
             yield f"{optimum.objective_name}: {optimum.objective:.4g}"

@@ -110,7 +110,7 @@ class RevolutionResult(AbstractStudyResult):
     revolutions: Mapping[str, Revolution]
 
     def tables(self) -> Iterator[Table]:
-        """One row per design."""
+        """Table of the results of all designs, one row each."""
         windows = next(iter(self.revolutions.values())).windows
         title = f"{self.design.title}: transmission error over {windows} base pitches, {self.design.torque:g} N m"
         yield table_of(_RECORDS, self.revolutions, title, "design")
@@ -138,7 +138,7 @@ class RevolutionResult(AbstractStudyResult):
                 )
 
     def inputs(self) -> dict[str, Any]:
-        """The torque."""
+        """Torque on the pinion [N m], as plain data."""
         return {UnitKey("torque", "N m"): self.design.torque}
 
     def summary(self) -> dict[str, Any]:

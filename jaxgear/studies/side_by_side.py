@@ -203,7 +203,7 @@ def _band(file: DesignFile, evaluations: Evaluations) -> dict[str, Any]:
 
 
 def flanks(evaluations: Evaluations) -> dict[str, tuple[AbstractModification, AbstractModification]]:
-    """The modifications of every design."""
+    """Modifications (pinion, wheel) by the name of the design."""
     return {name: (evaluation.pinion, evaluation.wheel) for name, evaluation in evaluations.items()}
 
 

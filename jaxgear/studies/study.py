@@ -32,7 +32,7 @@ class AbstractStudyResult(abc.ABC):
 
     @abc.abstractmethod
     def summary(self) -> dict[str, Any]:
-        """The results as plain data; a `UnitKey` is a name with a unit."""
+        """Results as plain data; use `UnitKey` for a name with a unit."""
 
     def headlines(self) -> Iterable[Table]:
         """Tables of two columns, shown before all others; they include the lines of `findings`."""

@@ -24,7 +24,7 @@ def identity(file: DesignFile) -> dict[str, Any]:
 
 
 def flanks_data(pinion: AbstractModification, wheel: AbstractModification) -> dict[str, Any]:
-    """The modifications of both gears, part by part."""
+    """Modifications of both gears by their parts, as plain data."""
     return {"pinion_modification": describe(pinion), "wheel_modification": describe(wheel)}
 
 

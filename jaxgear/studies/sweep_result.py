@@ -89,7 +89,7 @@ class SweepResult(AbstractStudyResult):
         yield f"{len(self.table):,} variants" + (f", {self.rate:,.0f}/s" if self.rate else "")
 
     def inputs(self) -> dict[str, Any]:
-        """The operating point, array sizes and variables."""
+        """Operating point, array sizes and variables, as plain data."""
         design = self.design
         return {
             UnitKey("torque", "N m"): design.signed_torque,

@@ -212,7 +212,7 @@ class WearResult(AbstractStudyResult):
         yield from wear_scatter.failures(self.scatters)
 
     def inputs(self) -> dict[str, Any]:
-        """Load, settings and tolerances."""
+        """Load, settings and tolerances, as plain data."""
         settings = self.settings
         return {
             UnitKey("torque", "N m"): self.design.torque,

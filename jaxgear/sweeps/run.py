@@ -157,7 +157,7 @@ def _part_rows(made: Variants, example: np.ndarray, variants: int, output: str |
 
 
 def _fill(evaluator: Evaluator, plan: AbstractPlan, store: Store, callback: Callback | None) -> None:
-    """Writes the missing parts of this process, and waits for those of the others."""
+    """Write the missing parts of this process, and wait for the parts of the others."""
     own, leader = range(jax.process_index(), store.parts, jax.process_count()), jax.process_index() == 0
     store.claim(leader=leader)
     if not leader:

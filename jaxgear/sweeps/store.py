@@ -115,7 +115,7 @@ class Store:
                 path.unlink(missing_ok=True)
 
     def write(self, part: int, columns: Mapping[str, np.ndarray]) -> None:
-        """Writes a part.
+        """Write a part.
 
         Raises:
             ValueError: when the disk is full or the folder is gone.

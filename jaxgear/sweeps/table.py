@@ -133,7 +133,7 @@ class SweepTable:
         raise ValueError(f'SweepTable: "{name}" is not a column, must be one of {", ".join(self.names)}')
 
     def batches(self, names: Sequence[str] | None = None) -> Iterator[dict[str, np.ndarray]]:
-        """The columns, part by part.
+        """Values of columns, one part of the table after the other.
 
         Args:
             names: of the columns wanted, None for all.
@@ -264,7 +264,7 @@ class SweepTable:
         return reader.__arrow_c_stream__(requested_schema)
 
     def to_csv(self, path: str | Path) -> None:
-        """Writes all rows as CSV with the units in the header; cells of failed results are empty."""
+        """Write all rows as CSV with the units in the header; cells of failed results are empty."""
         from pyarrow import csv
 
         quoted = (as_text(column.named).replace('"', '""') for column in self.columns)

@@ -116,7 +116,7 @@ def profile_trace(
     roll_length: Points | None = None,
     points: int = _POINTS,
 ) -> Trace:
-    """The profile of a flank, from the start of the active profile to the tip.
+    """Profile trace of a flank, from the start of the active profile to the tip.
 
     Args:
         side: the gear's side of the contact, of `mesh.sides`.
@@ -147,7 +147,7 @@ def helix_trace(
     face_coordinate: Points | None = None,
     points: int = _POINTS,
 ) -> Trace:
-    """The flank line, across the face width of the gear.
+    """Helix trace of a flank, across the face width of the gear.
 
     Args:
         side: the gear's side of the contact, of `mesh.sides`.

@@ -81,7 +81,7 @@ class WearHistory(WithStatus, Checked):
 
     @property
     def gears(self) -> tuple[Gear, Gear]:
-        """Pinion and wheel."""
+        """Pinion and wheel of the worn pair."""
         pair = self.cycles.kinematics.pair
         first = (0,) * self.cycles.batch_ndim  # the gears are the same at all time steps
         pinion, wheel = jax.tree.map(lambda leaf: leaf[first], (pair.pinion, pair.wheel))
