@@ -47,7 +47,7 @@ class Cutter(NamedTuple):
 
     @property
     def center_distance(self) -> Number:
-        """a_0 = m (z + z_0) cos(alpha) / (2 cos(alpha_w0)) [mm]."""
+        """Generating centre distance a_0 = m (z + z_0) cos(alpha) / (2 cos(alpha_w0)) [mm]."""
         return self.gear_pitch_radius + self.pitch_radius
 
     @property
@@ -158,21 +158,21 @@ def full_rounding(cutter_teeth: Number, pressure_angle: Number, cutter_shift: Nu
 def cutter_contact(
     g: Number, pitch_radius: Number, cutter_radius: Number, offset: Number, depth: Number
 ) -> tuple[Number, Number]:
-    """Contact of the arc at the cutter's tip with the fillet, on a common normal of the inclination g.
+    """Contact of the tip arc of the cutter with the fillet, on a common normal with the inclination g.
 
-    L = -r_w0 sin(g) + sqrt(c_0^2 - r_w0^2 cos(g)^2), written without a difference (depth / sin(g) of a rack), and
-    phi = (r_w0 theta + offset) / r_w with theta = atan2(L cos(g), r_w0 + L sin(g)). The inclination of the fillet's
-    normal is g - phi.
+    L = -r_w0 sin(g) + sqrt(c_0^2 - r_w0^2 cos(g)^2), computed without cancellation (depth / sin(g) for a rack), and
+    phi = (r_w0 theta + offset) / r_w with theta = atan2(L cos(g), r_w0 + L sin(g)). The inclination of the normal of
+    the fillet is g - phi.
 
     Args:
         g: inclination of the normal to the tangent of the pitch circles [rad].
-        pitch_radius, cutter_radius: r_w and r_w0, on which gear and cutter roll [mm].
-        offset: arc on the latter from the middle of the cutter's space to the centre of its rounding [mm].
-        depth: c_0 - r_w0, of that centre below it [mm].
+        pitch_radius, cutter_radius: generating pitch radii r_w of the gear and r_w0 of the cutter [mm].
+        offset: arc on the pitch circle of the cutter from the middle of its space to the centre of its rounding [mm].
+        depth: radial distance c_0 - r_w0 of the centre of the rounding outside the pitch circle of the cutter [mm].
 
     Returns:
-        distance from the pitch point to the centre of the rounding [mm], and the angle of the pitch point from the
-        middle of the gear's tooth [rad].
+        distance L from the pitch point to the centre of the rounding [mm], and angle phi of the pitch point from the
+        middle of the tooth of the gear [rad].
     """
     of = _library(depth)
     power, along = depth * (2 * cutter_radius + depth), cutter_radius * of.sin(g)

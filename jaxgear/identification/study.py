@@ -262,7 +262,7 @@ class IdentificationResult(AbstractStudyResult):
         yield left
 
     def verdict(self) -> Iterator[str]:
-        """Quality of the fit, related unknowns, what the data cannot tell, and the torque that would tell most."""
+        """Lines on the fit, correlated and undetermined unknowns, and the further torque with the most information."""
         found = self.found
         yield (
             f"chi-square per degree of freedom {float(found.chi_square):.2f} by noise alone, "
@@ -300,7 +300,7 @@ class IdentificationResult(AbstractStudyResult):
         return {UnitKey("torques", "N m"): self.found.torques}
 
     def summary(self) -> dict[str, Any]:
-        """Unknowns, correlations, directions without information, and the fit."""
+        """Unknowns, correlations, undetermined combinations and quality of the fit, as plain data."""
         found = self.found
         try:
             flanks = flanks_data(*self._flanks())

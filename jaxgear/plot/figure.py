@@ -172,12 +172,12 @@ def panels(
     height: float = HEIGHT,
     stacked: bool = False,
 ) -> Axes | np.ndarray:
-    """A new figure of several panels with a common ordinate, or with a common abscissa where they are stacked.
+    """New figure of several panels with a common ordinate, or with a common abscissa if they are stacked.
 
     Args:
-        draw: draws into the Axes of a panel; inner panels lose the label of the axis that all have in common.
-        each: what the panels show.
-        width, height: of a panel [mm].
+        draw: function that draws an item into the Axes of a panel; inner panels lose the label of the common axis.
+        each: items, one per panel.
+        width, height: size of a panel [mm].
         stacked: True for panels on top of each other, False for panels side by side.
     """
     shown = list(each)

@@ -383,7 +383,7 @@ class OptimizationResult(ComparisonResult):
             yield "constraints are not met"
 
     def checks(self) -> Iterator[tuple[str, str]]:
-        """Convergence of all designs, their numbers by finite elements, and the end of the search."""
+        """Checks of a report: convergence of all designs, values by finite elements, and convergence of the search."""
         yield from super().checks()
         optimum = self.optimum
         yield "all constraints met", text(optimum.feasible)

@@ -76,8 +76,9 @@ class WearResult(AbstractStudyResult):
         design: the design file.
         settings: revolutions and wear coefficients.
         designs: modifications (pinion, wheel) by the name of the design.
-        lives: wear histories by name.
-        scatters: numbers of the wear histories of manufactured pairs by name; empty where the file has no tolerances.
+        histories: wear histories by the name of the design.
+        scatters: quantities of the wear histories of manufactured pairs by the name of the design; empty if the file
+            has no tolerances.
     """
 
     assumptions: ClassVar = (
