@@ -24,8 +24,8 @@ class Flanks(NamedTuple):
         mesh: mesh prepared at the mesh positions of these flanks.
         removed: material removed from these flanks.
         order: index of the position of `mesh` for each position of the drive flanks, shape (positions,).
-        clearance: DTE from the contact of the unmodified drive flanks to the contact of these flanks [um]; 0 for the
-            drive flanks.
+        clearance: offset added to the DTE of these flanks, for a count from the contact of the unmodified drive flanks
+            [um]: the backlash for the coast flanks, 0 for the drive flanks.
     """
 
     mesh: Mesh

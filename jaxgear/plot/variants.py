@@ -69,7 +69,7 @@ def meaning_label(of: Quantity, before: str = "", after: str = "") -> str:
 
 
 def subsample(rows: np.ndarray, count: int) -> np.ndarray:
-    """At most `count` of the rows, drawn without order or replacement, the same ones every time."""
+    """Reproducible random sample of at most `count` rows without replacement, in ascending order."""
     if rows.size <= count:
         return rows
     return np.sort(np.random.default_rng(0).choice(rows, count, replace=False))

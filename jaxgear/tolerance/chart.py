@@ -103,7 +103,7 @@ def helix_range(side: Side) -> tuple[Scalar, Scalar]:
 
 
 def flank_place(side: Side, roll_length: Float[Array, "..."]) -> FlankPlace:
-    """A roll length [mm] as roll angle and diameter too."""
+    """Roll length [mm], roll angle [deg] and diameter [mm] of points on a flank, from their roll lengths [mm]."""
     return FlankPlace(roll_length, roll_angle(side.gear, roll_length), diameter(side.gear, roll_length))
 
 
