@@ -6,6 +6,7 @@ from typing import Literal
 import jax
 import jax.numpy as jnp
 import numpy as np
+import scipy  # its packages load when they are used
 from jaxtyping import Array, Bool, Complex, Float
 
 from ..numerics import Checked, Given, Numbers, check, kernel, program, real, result, whole
@@ -228,14 +229,12 @@ class _Follower:
 
         By Brent's method, which halves the distance where the branch has a corner, at which the tangent jumps.
         """
-        from scipy.optimize import brentq  # imported when asked for: it takes longer than what is done without it
-
         known = {0.0: test(self.tests), step: test(beyond)}
 
         def at(distance: float) -> float:
             return known[distance] if distance in known else test(tests_of(self.along(distance)[0]))
 
-        middle = brentq(at, 0.0, step, xtol=_LOCATED * step)
+        middle = scipy.optimize.brentq(at, 0.0, step, xtol=_LOCATED * step)
         point, orbit = self.along(middle)
         return middle, bifurcation_at(kind, self.scales.unknowns(point.place)[1], point, orbit)
 
