@@ -9,10 +9,17 @@ from rated_pairs import FZG_C, STAGE_3, rated, unlimited, with_rating
 import jaxgear as jg
 from jaxgear.contact.status import Status
 from jaxgear.numerics import changed, quick_jit
-from jaxgear.rating import GearRating, rate, rating_findings
+from jaxgear.rating import GearRating, Rating, mesh_geometry, rate, rating_findings
 from jaxgear.rating.flank import flank_factors
 from jaxgear.rating.life import SNLine, equivalent_torque, safety
-from jaxgear.rating.load_factors import constants_of, factor_of, resonance_speed, run_in, transverse_load_factors
+from jaxgear.rating.load_factors import (
+    constants_of,
+    factor_of,
+    load_factors,
+    resonance_speed,
+    run_in,
+    transverse_load_factors,
+)
 from jaxgear.rating.materials import GROUPS, QUALITIES
 from jaxgear.rating.root import bending_factors, rim_factor
 
@@ -69,6 +76,24 @@ def test_transverse_factors_lie_between_even_sharing_and_one_pair():
     contact, root = transverse_load_factors(geometry, 1e3)
     assert float(contact) == pytest.approx(total / (along * float(KS3.flank.contact_ratio) ** 2))
     assert float(root) == pytest.approx(total / (0.25 * along + 0.75))
+
+
+def test_face_load_factor_by_method_c():
+    """Of a published pair, from deviations that are printed without decimals; 1.32 printed."""
+    rating = changed(
+        FZG_C.rating, face_load_factor=None, shaft_deflection=jnp.asarray(6.0), mesh_misalignment=jnp.asarray(8.0)
+    )
+    pair = jg.GearPair(*FZG_C.gears, FZG_C.center_distance)
+    geometry = mesh_geometry(pair, unlimited(pair))
+    found = load_factors(pair, geometry, jnp.asarray(130.0), jnp.asarray(1500.0), rating)
+    assert float(found.face) == pytest.approx(1.331, abs=2e-3)
+    deviation = (1 - 0.15) * (1.33 * 6 + 8)
+    load = float(found.line_load * found.dynamic)
+    assert float(found.face) == pytest.approx(1 + deviation * float(found.face_mesh_stiffness) / (2 * load), rel=1e-9)
+    with pytest.raises(ValueError, match="belong together"):
+        Rating(shaft_deflection=6.0)
+    with pytest.raises(ValueError, match="has no effect beside face_load_factor"):
+        Rating(shaft_deflection=6.0, mesh_misalignment=8.0, face_load_factor=1.2)
 
 
 def test_slow_gears_are_told():

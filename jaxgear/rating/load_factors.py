@@ -9,6 +9,9 @@ References:
     oscillator with few per cent of damping has it, is far above. Use K_v to order designs.
 """
 
+from collections.abc import Mapping
+from typing import Any
+
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
@@ -17,7 +20,7 @@ from ..contact.status import Status, Statuses, status_of
 from ..geometry import Gear, GearPair
 from ..metrics.stress import contact_ratio_square
 from ..numerics import Checked, Given, real, result
-from ..shafts import root_face_load_factor, tooth_height
+from ..shafts import method_c, root_face_load_factor, tooth_height
 from ..tolerance import ToleranceClass
 from .mesh_geometry import MeshGeometry
 from .settings import GearRating, Rating, rated_pair
@@ -33,6 +36,8 @@ _MAIN, _INTERMEDIATE = 1.15, 1.5  # ends of the main and the intermediate range 
 LEAST_SPEED = 3.0  # [m/s] of v z_1 / 100 sqrt(u^2 / (1 + u^2)), below which method B is of little use
 _COARSE = 6  # tolerance class, from which on tip relief does not count in K_v
 _OPTIMAL = 0.5  # share of the deviations that counts in K_Halpha, of flanks relieved for the load
+
+_HARDENING: Mapping[str, Any] = {"hard": "surface_hardened", "soft": "through_hardened", "cast": "cast_iron"}
 
 # of y_p, y_f and y_alpha: share of the deviation, and the most [um] above 5 and above 10 m/s
 _RUN_IN_HARD = 0.075, 3.0
@@ -144,7 +149,7 @@ def load_factors(
         torque: on the pinion [N m].
         speed: of the pinion [rpm].
         rating: settings.
-        face_load_factor: K_Hbeta where the rating gives none.
+        face_load_factor: K_Hbeta where the rating gives neither it nor what method C needs.
         tip_relief: C_a where the rating gives none [um].
     """
     application, sharing = rating.application_factor, rating.mesh_load_factor
@@ -166,7 +171,10 @@ def load_factors(
     begins = 0.5 + (_MAIN_BEGINS - 0.5) * lightness
     constants, ratio = constants_of(geometry.total_contact_ratio), real(speed) / resonance
     dynamic = factor_of(ratio, begins, *terms, constants) if rating.dynamic_factor is None else rating.dynamic_factor
-    face = real(face_load_factor) if rating.face_load_factor is None else rating.face_load_factor
+    if rating.shaft_deflection is not None:
+        face = _by_method_c(rating, load * dynamic, _FACE_SHARE * mesh)
+    else:
+        face = real(face_load_factor) if rating.face_load_factor is None else rating.face_load_factor
     root_face = rating.root_face_load_factor
     if root_face is None:
         root_face = root_face_load_factor(face, pair.face_width, tooth_height(pair))
@@ -205,6 +213,18 @@ def load_factors(
         constants=constants,
         usable_speed=velocity * geometry.teeth[0] / 100 * u / jnp.sqrt(1 + u**2),
     )
+
+
+def _by_method_c(rating: Rating, line_load: Scalar, stiffness: Scalar) -> Scalar:
+    """K_Hbeta from f_sh and f_ma, for F_m / b = F_t K_A K_gamma K_v / b: the mean of the running-in of both gears."""
+    assert rating.shaft_deflection is not None and rating.mesh_misalignment is not None
+    found = []
+    for gear in rating.gears:
+        kind = gear.group.kind.running_in
+        limit = gear.pitting_strength if kind == "soft" else None
+        given = {"hardening": _HARDENING[kind], "endurance_limit": limit, "helix_tolerance": jnp.zeros_like(line_load)}
+        found.append(method_c(line_load, stiffness, rating.shaft_deflection, rating.mesh_misalignment, **given))
+    return 0.5 * (found[0] + found[1])
 
 
 def transverse_load_factors(geometry: MeshGeometry, moved: Given) -> tuple[Scalar, Scalar]:

@@ -117,7 +117,7 @@ def _mesh(found: PairRating, rating: Rating) -> Iterator[Row]:
     yield Row("K_A", "application factor", factors.application, origin=_GIVEN)
     yield Row("K_gamma", "mesh load factor", factors.mesh, origin=_GIVEN)
     yield Row("K_v", "dynamic factor", factors.dynamic, origin=_origin(rating.dynamic_factor))
-    face = _origin(rating.face_load_factor, _CONTACT)
+    face = "method C" if rating.shaft_deflection is not None else _origin(rating.face_load_factor, _CONTACT)
     yield Row("K_Hbeta", "face load factor, flank", factors.face, origin=face)
     root = _origin(rating.root_face_load_factor)
     yield Row("K_Fbeta", "face load factor, root", factors.root_face, origin=root)

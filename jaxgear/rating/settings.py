@@ -170,7 +170,10 @@ class Rating(AbstractSettings):
         application_factor: K_A; 1 with a load spectrum.
         mesh_load_factor: K_gamma, uneven sharing between several meshes.
         dynamic_factor: K_v; by method B of ISO 6336-1 where it is not given.
-        face_load_factor: K_Hbeta; that of the contact analysis where it is not given.
+        face_load_factor: K_Hbeta; by method C from `shaft_deflection` and `mesh_misalignment`, or else that of the
+            contact analysis, where it is not given.
+        shaft_deflection: f_sh, by bending and torsion of the pinion and its shaft over the face width, for method C.
+        mesh_misalignment: f_ma, by manufacture over the face width, for method C.
         root_face_load_factor: K_Fbeta; by method B from K_Hbeta where it is not given.
         transverse_load_factor: K_Halpha = K_Falpha; by method B where it is not given.
         service_life: L_h; endurance limits (life factors of 1) without it.
@@ -198,6 +201,8 @@ class Rating(AbstractSettings):
     mesh_load_factor: Scalar = number("", low=1.0, high=10.0, default=1.0)
     dynamic_factor: Scalar | None = number("", low=0.0, high=10.0, open_low=True, optional=True, default=None)
     face_load_factor: Scalar | None = number("", low=0.0, high=10.0, open_low=True, optional=True, default=None)
+    shaft_deflection: Scalar | None = number("um", low=0.0, optional=True, default=None)
+    mesh_misalignment: Scalar | None = number("um", low=0.0, optional=True, default=None)
     root_face_load_factor: Scalar | None = number("", low=0.0, high=10.0, open_low=True, optional=True, default=None)
     transverse_load_factor: Scalar | None = number("", low=0.0, high=10.0, open_low=True, optional=True, default=None)
     service_life: Scalar | None = number("h", low=0.0, open_low=True, optional=True, default=None)
@@ -214,6 +219,12 @@ class Rating(AbstractSettings):
     wheel: GearRating = eqx.field(default_factory=GearRating)
     lubricant: Lubricant | None = None
     loads: LoadSpectrum | None = None
+
+    def check_together(self) -> None:
+        if (self.shaft_deflection is None) != (self.mesh_misalignment is None):
+            raise ValueError("Rating: shaft_deflection and mesh_misalignment belong together, give both")
+        if self.shaft_deflection is not None and self.face_load_factor is not None:
+            raise ValueError("Rating: shaft_deflection has no effect beside face_load_factor, give either")
 
     @property
     def gears(self) -> tuple[GearRating, GearRating]:
