@@ -1,5 +1,7 @@
 """Random contact problems in the range of gear teeth, for the tests of the contact solver."""
 
+from dataclasses import replace
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -49,7 +51,26 @@ def problem(compliance, law, gap, *, lever=None, weight=(1.0,), load=1.0) -> Con
     """A contact problem from anything array-like; levers default to 1."""
     gap = jnp.asarray(gap)
     lever = jnp.ones((gap.shape[0], gap.shape[-1])) if lever is None else jnp.asarray(lever)
-    return ContactProblem(jnp.asarray(compliance), law, gap, lever, jnp.asarray(weight), jnp.asarray(load))
+    compliance, lever = jnp.asarray(compliance)[:, :, None], lever[:, None]
+    return ContactProblem(compliance, law, gap, lever, jnp.asarray(weight), jnp.asarray(load))
+
+
+def coupled(problem, coupling, **given) -> ContactProblem:
+    """The problem with slices coupled on bodies."""
+    return replace(problem, compliance=coupling.local(len(problem.gap)), coupling=coupling, **given)
+
+
+def influence(coupling, weight=1.0):
+    """Deflection of every slice of every pair under the line load of every other one, without a support: the whole
+    matrix in NumPy, shape (pairs, slices, pairs, slices, positions).
+    """
+    modes, found = np.asarray(coupling.modes), 0.0
+    for compliance, share, rest in coupling.bodies:
+        face = float(rest) * np.eye(len(modes)) + modes @ np.asarray(share) @ modes.T * weight
+        found = found + np.einsum("ijx,st->isjtx", compliance, face)
+    if coupling.scale is not None:
+        found = np.einsum("isx,isjtx,jtx->isjtx", coupling.scale, found, coupling.scale)
+    return found
 
 
 def random_problem(seed, springs, slices, positions, law="softening", levers=True) -> ContactProblem:

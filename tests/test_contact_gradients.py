@@ -104,7 +104,7 @@ def test_jacobians_of_approach_and_loads():
     np.testing.assert_allclose(approach_by_load, 1 / stiffness, rtol=1e-12)
     own = jnp.stack([approach_by_gap[n, ..., n] for n in range(POSITIONS)], axis=-1)
     np.testing.assert_allclose(own, DATA.weight[None, :, None] * load_by_load, rtol=1e-10, atol=1e-15)
-    total = jnp.einsum("in,s,isn...->n...", DATA.lever, DATA.weight, load_by_gap)
+    total = jnp.einsum("in,s,isn...->n...", DATA.lever[:, 0], DATA.weight, load_by_gap)
     assert float(jnp.abs(load_by_gap).max()) > 1.0
     np.testing.assert_allclose(total, 0.0, atol=1e-11)
 

@@ -8,14 +8,14 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from catalogue import FACE, LINE
-from contact_problems import kernel_of, modes_of, random_problem, solved_in_20, stiffness_at
+from contact_problems import coupled, influence, kernel_of, modes_of, random_problem, solved_in_20, stiffness_at
 from gearboxes import two_stages
 
 import jaxgear as jg
 from jaxgear.compliance import face_kernel, few_modes
 from jaxgear.contact.prescribed import solve_series
 from jaxgear.contact.status import Status
-from jaxgear.numerics import ContactProblem, SliceCoupling
+from jaxgear.numerics import Body, ContactProblem, SliceCoupling
 from jaxgear.optimize.refine import _with_positions
 from jaxgear.optimize.verdict import verification
 from jaxgear.shafts import Misalignment, RigidSupport, TabulatedSupport, support
@@ -140,26 +140,27 @@ def coupled_problem(seed, springs, slices, count, bends=0):
         shapes, held = np.linalg.qr(np.vander(np.linspace(-1, 1, slices), bends, increasing=True))[0], root @ root.T
         shapes[:, 0], held = slices**-0.5, jnp.asarray(0.01 * held)
         shapes = jnp.asarray(shapes)
-    coupling = SliceCoupling(*modes_of(kernel(slices), count), shapes, held)
     problem = random_problem(seed, springs, slices, 6)
-    return replace(problem, coupling=coupling, weight=jnp.full(slices, WIDTH / slices), load=jnp.asarray(2000.0))
+    modes, *spread = modes_of(kernel(slices), count)
+    bodies = (Body(problem.compliance[:, :, 0], *spread),)
+    coupling = SliceCoupling(modes, bodies, support_modes=shapes, support=held)
+    return coupled(problem, coupling, weight=jnp.full(slices, WIDTH / slices), load=jnp.asarray(2000.0))
 
 
 def dense(problem):
     """Influence of every load on every deflection, shape (positions, springs, slices, springs, slices)."""
     c = problem.coupling
-    face = c.rest * np.eye(len(c.modes)) + c.modes @ c.share @ c.modes.T
-    found = np.einsum("ijx,st->xisjt", problem.compliance, face)
+    found = np.moveaxis(influence(c), -1, 0)
     if c.support is not None:
         held = c.support_modes @ c.support @ c.support_modes.T
-        found = found + np.einsum("ix,jx,st->xisjt", problem.lever, problem.lever, held)
+        found = found + np.einsum("ix,jx,st->xisjt", problem.lever[:, 0], problem.lever[:, 0], held)
     return found
 
 
 def assert_conditions(problem, approach, load, own, opening):
     """Deflections by the whole matrix in NumPy: no overlap, no pull, closed where loaded."""
     approach, load, lever = map(np.asarray, (approach, load, problem.lever))
-    left = np.einsum("xisjt,jtx->isx", dense(problem), load) + np.asarray(problem.gap) - (lever * approach)[:, None]
+    left = np.einsum("xisjt,jtx->isx", dense(problem), load) + np.asarray(problem.gap) - lever * approach
     total = left + np.asarray(own) * load
     scale = 1e-9 * np.abs(approach).max()
     assert (load >= 0).all() and 0.1 < (load > 0).mean() < 0.9
@@ -170,7 +171,7 @@ def assert_conditions(problem, approach, load, own, opening):
 
 def carried(problem, load):
     """Force on the line of action at every position."""
-    return np.einsum("ix,s,isx->x", problem.lever, problem.weight, load)
+    return np.einsum("ix,s,isx->x", problem.lever[:, 0], problem.weight, load)
 
 
 own_deflection = jax.jit(lambda law, load: law.secant(jnp.maximum(load, 1e-9)))
@@ -184,10 +185,10 @@ def test_solution_meets_the_conditions_of_the_dense_problem(mesh, on_table, held
     found = jg.contact.solve_removed(prepared, TORQUE, rough)
     assert bool(found.converged.all())
     problem = ContactProblem(
-        prepared.structure,
+        prepared.own_structure,
         prepared.law,
         prepared.held(found.gap),
-        prepared.lever,
+        prepared.lever[:, None],
         prepared.slice_width,
         found.force,
         coupling=prepared.coupling,
@@ -250,7 +251,8 @@ def test_slope_is_mirrored_and_loads_the_end_more_than_slices_of_their_own(mesh,
     other = jg.solve(mesh, TORQUE, pinion=jg.LeadSlope(-20.0))
     np.testing.assert_allclose(other.line_load, sloped.line_load[:, ::-1], rtol=1e-8, atol=1e-8)
     np.testing.assert_allclose(other.transmission_error, sloped.transmission_error, rtol=1e-10)
-    own = replace(mesh.coupling, share=1e-6 * jnp.eye(3), rest=jnp.ones(()))  # hardly anything of the kernel
+    body = mesh.coupling.bodies[0]._replace(share=1e-6 * jnp.eye(3), rest=jnp.ones(()))  # hardly any of the kernel
+    own = replace(mesh.coupling, bodies=(body,))
     alone = jg.solve(replace(mesh, coupling=own), TORQUE, pinion=SLOPE)
     # three-dimensional finite elements: 292 instead of 241 N/mm
     assert 1.15 < float(sloped.line_load.max() / alone.line_load.max()) < 1.40

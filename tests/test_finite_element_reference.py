@@ -60,7 +60,7 @@ def pairs_at(pair, compliance, path, apart, torque):
     force = 1e3 * torque / pair.pinion.base_radius
     gap = apart[:, None, None]
     structure = jnp.sum(compliance.structure(pinion, wheel), axis=0)
-    problem = ContactProblem(structure, law, gap, jnp.ones_like(path), pair.face_width[None], force)
+    problem = ContactProblem(structure[:, :, None], law, gap, jnp.ones_like(gap), pair.face_width[None], force)
     solution = solve_contact(problem, steps=8)
     windup = jnp.sum(compliance.hub(pinion, wheel)) * force / pair.face_width
     return solution.approach[0] + windup, solution.line_load[:, 0, 0] * pair.face_width / force

@@ -1,6 +1,5 @@
 """How teeth and bodies spread a load over their faces, and how the slices of a mesh are elastically coupled."""
 
-from dataclasses import replace
 from functools import reduce
 from operator import add
 from typing import NamedTuple
@@ -13,7 +12,7 @@ from jaxtyping import Array, Bool, Float
 from ..compliance import AbstractCompliance, face_ends, face_kernel, few_modes, slice_basis
 from ..geometry import GearPair, is_even
 from ..geometry.outline import Outline
-from ..numerics import Other, SliceCoupling, concrete, real
+from ..numerics import Body, SliceCoupling, concrete, real
 from .kinematics import Kinematics
 from .resolution import Resolution
 from .support import AbstractSupport
@@ -103,7 +102,7 @@ def slices_alike(
 def coupling_of(
     moving: Kinematics,
     spreading: Spreading,
-    wheel: Float[Array, "pairs pairs *own positions"],
+    structures: Float[Array, "gears pairs pairs *own positions"],
     scale: Float[Array, "pairs slices positions"] | None,
     support: AbstractSupport | None,
     slopes: Float[Array, "gears"],
@@ -116,7 +115,7 @@ def coupling_of(
     Args:
         moving: kinematics of the pair.
         spreading: how both gears spread loads.
-        wheel: compliance of the wheel, see `Mesh.structure`.
+        structures: compliance of both gears, see `Mesh.structure`.
         scale: of the slices, see `slices_alike`; None where all are alike.
         support: shafts, bearings and housing.
         slopes: of both bodies, see `AbstractCompliance.slope`.
@@ -126,22 +125,21 @@ def coupling_of(
         return None
     kernels = spreading.kernels
     modes, shares, rests = few_modes(kernels, sizes.face_modes, spreading.ends, sizes.parts)
-    weight = None if sizes.slice_weights is None else jnp.asarray(sizes.slice_weights, modes.dtype)
-    if weight is not None:  # modes of the loads times the roots of the widths
-        modes = modes / jnp.sqrt(weight)[:, None]
-    coupling = SliceCoupling(modes, shares[0], rests[0], weight=weight, scale=scale)
-    if len(kernels) > 1:
-        coupling = replace(coupling, other=Other(wheel, shares[1] - shares[0], rests[1] - rests[0]))
+    weight = np.ones(sizes.slices) if sizes.slice_weights is None else sizes.slice_weights
+    if sizes.parts is not None:  # modes of the loads times the roots of the widths
+        modes = modes / jnp.asarray(np.sqrt(weight)[:, None], modes.dtype)
+    # gears that spread loads alike are one body
+    compliances = structures if len(kernels) > 1 else jnp.sum(structures, axis=0)[None]
+    bodies = tuple(map(Body, compliances, shares, rests))
     parts = [_tilt(moving, slopes)] if moving.helical else []
     if support is not None:
         parts.append(support.influence(moving.face_coordinate))
     if not parts:
-        return coupling
+        return SliceCoupling(modes, bodies, scale)
     bends = jnp.asarray(_polynomials(sizes), kernels.dtype)[:, : 2 if support is None else None]
-    loads = bends if weight is None else weight[:, None] * bends
+    loads = jnp.asarray(weight[:, None], bends.dtype) * bends
     influence = reduce(add, parts).astype(kernels.dtype) * jnp.mean(moving.slice_width)
-    bent = jnp.linalg.multi_dot([loads.T, influence, loads])
-    return replace(coupling, support_modes=bends, support=bent, crosswise=support is None)
+    return SliceCoupling(modes, bodies, scale, bends, jnp.linalg.multi_dot([loads.T, influence, loads]))
 
 
 def _tilt(moving: Kinematics, slopes: Float[Array, "gears"]) -> Float[Array, "slices slices"]:

@@ -154,6 +154,18 @@ class Mesh(eqx.Module):
         """Middle of every slice, from the middle of the common face [mm], shape (slices,)."""
         return self.kinematics.face_coordinate
 
+    @property
+    def own_structure(self) -> Float[Array, "pairs pairs #slices positions"]:
+        """Compliance of every slice on its own [um per N/mm]."""
+        if self.coupling is not None:
+            return self.coupling.local(len(self.structure))
+        return self.structure if self.structure.ndim == 4 else self.structure[:, :, None]
+
+    @property
+    def leans(self) -> bool:
+        """Whether what moves all slices alike is the tilt of helical bodies alone, on rigid, parallel shafts."""
+        return self.coupling is not None and self.kinematics.helical and self.support_gap is None
+
     def held(self, gap: Float[Array, "pairs slices positions"]) -> Float[Array, "pairs slices positions"]:
         """A gap of the flanks [um] with the gap of the support."""
         return gap if self.support_gap is None else gap + over_slices(self.lever) * self.support_gap[None, :, None]
@@ -164,7 +176,10 @@ class Mesh(eqx.Module):
         Args:
             line_load: of all pairs [N/mm].
         """
-        bent = None if self.coupling is None else self.coupling.support_deflection(self.lever, list(line_load))
+        if self.coupling is None:
+            return jnp.zeros_like(line_load[0, 0])
+        weight = self.slice_width / jnp.mean(self.slice_width)
+        bent = self.coupling.support_deflection(weight, over_slices(self.lever), list(line_load))
         return jnp.zeros_like(line_load[0, 0]) if bent is None else jnp.min(bent, axis=0)
 
     def flanks(self, offset: Given = 0.0) -> tuple[Flank, Flank]:
@@ -382,7 +397,7 @@ def _arrays_of(
         width_factor=width_factor,
         hub=jnp.sum(hubs),
         slice_width=moving.slice_width,
-        coupling=coupling_of(moving, places.spreading, structures[1], scale, support, slopes),
+        coupling=coupling_of(moving, places.spreading, structures, scale, support, slopes),
         support=support,
         support_gap=None if support is None else support.gap(moving.face_coordinate).astype(moving.slice_width.dtype),
         support_torque=None if support is None else support.torque,
@@ -493,10 +508,9 @@ def _joined(parts: list[list[Array | AbstractSpring]]) -> list[Array | AbstractS
 def _by_position(mesh: Mesh) -> list[Array | AbstractSpring]:
     """Everything whose last axis is that of the positions."""
     coupled: list[Array] = []
-    if mesh.coupling is not None and mesh.coupling.scale is not None:
-        coupled.append(mesh.coupling.scale)
-    if mesh.coupling is not None and mesh.coupling.other is not None:
-        coupled.append(mesh.coupling.other.compliance)
+    if mesh.coupling is not None:
+        coupled = [body.compliance for body in mesh.coupling.bodies]
+        coupled += [] if mesh.coupling.scale is None else [mesh.coupling.scale]
     return [*_by_contact(mesh), mesh.structure, *coupled]
 
 

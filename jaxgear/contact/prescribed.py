@@ -102,9 +102,10 @@ def _solve_at(mesh: Mesh, approach: Curve, removed: RemovedMaterial, shared: Sca
 
     Its deflection is then part of the approach and of the tangent stiffness, not of the transmission error.
     """
-    structure = mesh.structure
+    structure = mesh.own_structure
     if shared is not None:
-        structure = structure + shared * mesh.slice_width[0] * mesh.lever[:, None] * mesh.lever[None]
+        lever = over_slices(mesh.lever)
+        structure = structure + shared * mesh.slice_width[0] * lever[:, None] * lever[None]
     gap = over_slices(mesh.corner_gap) + removed.amount
     contact = contact_of(mesh, gap, removed.shift, approach=approach, compliance=structure)
     solution = contact.solution

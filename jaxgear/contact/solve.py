@@ -20,7 +20,6 @@ from ..numerics import (
     Known,
     concrete,
     minimum,
-    nearest,
     opening,
     over_slices,
     program,
@@ -294,10 +293,10 @@ def contact_of(mesh: Mesh, gap: Load, shift: Float[Array, "pairs #slices positio
     if "load" in given:
         given["start_law"] = mesh.law
     problem = ContactProblem(
-        **{"compliance": mesh.structure, **given},
+        **{"compliance": mesh.own_structure, **given},
         law=mesh.law.moved(shift),
         gap=mesh.held(gap),
-        lever=mesh.lever,
+        lever=over_slices(mesh.lever),
         weight=mesh.slice_width,
         coupling=mesh.coupling,
     )
@@ -309,30 +308,41 @@ def contact_of(mesh: Mesh, gap: Load, shift: Float[Array, "pairs #slices positio
 
 
 def _of_two_pairs(mesh: Mesh, problem: ContactProblem) -> Contact:
-    """The contact where in every slice only the two pairs next to the middle of the path can touch."""
+    """The contact where in every slice only the two pairs next to the middle of the path can touch.
+
+    They are the springs of the problem: of the even pairs the first one, of the odd pairs the second one.
+    """
     coupling, known = problem.coupling, problem.known
-    assert coupling is not None  # `pairs_alternate` asks for it
-    two = nearest(jnp.abs(mesh.kinematics.contact_path))
-    rows = partial(jax.tree.map, two.rows)
+    assert coupling is not None and coupling.scale is not None  # `pairs_alternate` asks for both
+    distance = jnp.abs(mesh.kinematics.contact_path)
+    nearest = [jnp.argmin(distance[first::2], axis=0) for first in (0, 1)]
+    chosen = jnp.stack([nearest[i % 2] == i // 2 for i in range(len(distance))])
+
+    def springs(pairs: Array) -> Array:
+        rows = [pairs[0], pairs[1]]
+        for i in range(2, len(pairs)):
+            rows[i % 2] = jnp.where(chosen[i], pairs[i], rows[i % 2])
+        return jnp.stack([jnp.broadcast_to(row, chosen.shape[1:]) for row in rows])
+
+    def pairs(springs: Array) -> Array:
+        return jnp.stack([jnp.where(flag, springs[i % 2], jnp.zeros_like(springs[0])) for i, flag in enumerate(chosen)])
+
+    touching = replace(coupling, scale=jnp.where(chosen, coupling.scale, 0.0))
     near = replace(
         problem,
-        law=rows(problem.law),
-        start_law=rows(problem.start_law),
-        gap=rows(problem.gap),
-        lever=rows(problem.lever),
-        coupling=replace(coupling, scale=rows(coupling.scale), alternation=two),
-        known=known and Known(two.rows(known.line_load), two.rows(known.opening), known.approach),
+        compliance=touching.local(2),
+        law=jax.tree.map(springs, problem.law),
+        start_law=jax.tree.map(springs, problem.start_law),
+        gap=springs(problem.gap),
+        lever=springs(problem.lever),
+        coupling=touching,
+        known=known and Known(springs(known.line_load), springs(known.opening), known.approach),
     )
     found = _solved(mesh, near)
-    load = two.springs(list(found.line_load))
-    left = jnp.stack(opening(problem, load, found.approach))
-    solution = replace(
-        found,
-        line_load=jnp.stack(load),
-        opening=left,
-        in_contact=jnp.stack(two.springs(list(found.in_contact))),
-    )
-    apart = jnp.min(jnp.where(two.chosen, 0.0, left), axis=(0, 1)) >= 0
+    load = pairs(found.line_load)
+    left = jnp.stack(opening(problem, list(load), found.approach))
+    solution = replace(found, line_load=load, opening=left, in_contact=pairs(found.in_contact))
+    apart = jnp.min(jnp.where(chosen, 0.0, left), axis=(0, 1)) >= 0
     return Contact(problem.gap, solution, tangent_stiffness(near, found), apart)
 
 
@@ -344,23 +354,23 @@ def _solved(mesh: Mesh, problem: ContactProblem) -> ContactSolution:
     """
     sizes, coupling = mesh.resolution, problem.coupling
     solve = partial(solve_contact, steps=sizes.newton_steps, tolerance=sizes.rtol)
-    if problem.load is None or coupling is None or not coupling.crosswise:
+    if problem.load is None or coupling is None or not mesh.leans:
         return solve(problem)
     assert coupling.support is not None and coupling.support_modes is not None
     even, leaning = coupling.support_modes.T
     by_load = coupling.support[1, 0] * even[0]
     total = jnp.atleast_1d(problem.load / jnp.mean(mesh.slice_width))
     gap = (leaning[:, None] * by_load * total[None])[None]
-    upright = replace(coupling, support_modes=None, support=None, crosswise=False)
+    upright = replace(coupling, support_modes=None, support=None)
 
     def leant(line_load: Load) -> Curve:
-        force = sum(lever * q for lever, q in zip(problem.levers, line_load))
-        return by_load * jnp.sum(leaning[:, None] * coupling.weighted(force), axis=0)
+        force = problem.relative_weight[:, None] * sum(lever * q for lever, q in zip(problem.lever, line_load))
+        return by_load * jnp.sum(leaning[:, None] * force, axis=0)
 
     known = problem.known
     if known is not None:
         known = known._replace(approach=known.approach - leant(known.line_load))
-    gap = stored(problem.gap + problem.levers * gap)
+    gap = stored(problem.gap + problem.lever * gap)
     found = solve(replace(problem, gap=gap, coupling=upright, known=known))
     return replace(found, approach=found.approach + leant(found.line_load))
 

@@ -1,7 +1,5 @@
 """Numerical tools without a gear word: fields, safe functions, extremes, quadrature, roots, complementarity, risk."""
 
-from .alternation import Alternation as Alternation
-from .alternation import nearest as nearest
 from .batching import on_both as on_both
 from .batching import over_batch as over_batch
 from .complementarity import solve_contact as solve_contact
@@ -20,7 +18,7 @@ from .conversion import optional_real as optional_real
 from .conversion import real as real
 from .coupled_points import Pressed as Pressed
 from .coupled_points import press as press
-from .coupling import Other as Other
+from .coupling import Body as Body
 from .coupling import SliceCoupling as SliceCoupling
 from .dense import pivots as pivots
 from .dense import positive_definite as positive_definite

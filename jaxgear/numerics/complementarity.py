@@ -38,18 +38,15 @@ from .contact_problem import (
     slopes_under,
 )
 from .contact_system import (
-    correction,
     eliminable,
     eliminate,
-    given_approach,
-    given_load,
+    left_after,
     load_per_approach,
     opening,
-    step,
+    respond,
     total,
     without_gap,
 )
-from .coupling import CoupledFactors
 from .implicit import jvp_of_given
 from .safe import unit
 
@@ -81,9 +78,9 @@ def solve_contact(problem: ContactProblem, *, steps: int, tolerance: float | Non
     """
     # a gap common to all springs only shifts the approach: without it light loads lose no digits to wide gaps
     tolerance = _TOLERANCE[problem.gap.dtype] if tolerance is None else tolerance
-    closing = problem.gap / problem.levers
+    closing = problem.gap / problem.lever
     common = jax.lax.stop_gradient(jnp.min(closing, axis=(0, 1)))
-    problem = eqx.tree_at(lambda p: p.gap, problem, problem.levers * (closing - common[None, None]))
+    problem = eqx.tree_at(lambda p: p.gap, problem, problem.lever * (closing - common[None, None]))
     if problem.approach is not None:
         problem = eqx.tree_at(lambda p: p.approach, problem, problem.approach - common)
     v, approach, residual = _solve(steps, tolerance, problem, common)
@@ -195,9 +192,9 @@ def _solve_jvp(steps, tolerance, primals, tangents):
     place = jnp.arange(len(v))[:, None, None]
     known = [-jnp.sum(jnp.where(place == i, mismatch_dot, 0.0), axis=0) / unit(row) for i, row in enumerate(v)]
     if problem.load is None:
-        v_dot, approach_dot = given_approach(problem, factors, known, jnp.zeros_like(approach)), last_dot
+        v_dot, approach_dot = respond(problem, factors, known, approach=jnp.zeros_like(approach)).load, last_dot
     else:
-        v_dot, approach_dot = given_load(problem, factors, known, -last_dot)
+        v_dot, approach_dot, _ = respond(problem, factors, known, load=-last_dot)
     return (v, approach, residual), (v_dot, approach_dot, jnp.zeros_like(residual))
 
 
@@ -209,21 +206,21 @@ def _start(problem: ContactProblem) -> tuple[Rows, Slopes]:
     if problem.load is None:
         return _start_at(problem)
     even = problem.load / jnp.sum(problem.weight)
-    loads = [jnp.broadcast_to(even, lever.shape) for lever in problem.levers]
+    loads = [jnp.broadcast_to(even, lever.shape) for lever in problem.lever]
     secant = secants_under(problem, loads)
     # gaps wider than the approach of any one spring that bears the load alone stay open
     alone = [
         jnp.max((gap + (c + own) * load) / lever, axis=0)
-        for gap, c, own, lever, load in zip(problem.gap, secant, problem.own_compliance, problem.levers, loads)
+        for gap, c, own, lever, load in zip(problem.gap, secant, problem.own_compliance, problem.lever, loads)
     ]
     bound = jnp.min(jnp.stack(alone), axis=0)
-    return [lever * bound[None] - gap for lever, gap in zip(problem.levers, problem.gap)], secant
+    return [lever * bound[None] - gap for lever, gap in zip(problem.lever, problem.gap)], secant
 
 
 def _start_at(problem: ContactProblem) -> tuple[Rows, Slopes]:
     """Contact wherever the approach closes the gap, and the secants under the loads of every spring on its own."""
     assert problem.approach is not None
-    closed = [lever * problem.approach[None] - gap for lever, gap in zip(problem.levers, problem.gap)]
+    closed = [lever * problem.approach[None] - gap for lever, gap in zip(problem.lever, problem.gap)]
     load = [jnp.ones_like(row) for row in closed]
     for _ in range(_OWN_STEPS):
         secant = secants_under(problem, load)
@@ -236,10 +233,11 @@ def _newton(problem: ContactProblem, v: Rows, secant: Slopes, slope: Slopes) -> 
     active, carried = active_of(problem, v), carried_by(v)
     factors = eliminate(problem, active, slope)
     known = [-gap - (c - s) * q for gap, c, s, q in zip(problem.gap, secant, slope, carried)]
-    load, approach, left = step(problem, factors, known)
+    found = respond(problem, factors, known, load=problem.load, approach=problem.approach)
+    left = left_after(problem, found, list(problem.gap))
     return [
-        jnp.where(flag, q, -y * inverse) for flag, q, y, inverse in zip(active, load, left, factors.per_slope)
-    ], approach
+        jnp.where(flag, q, -y * inverse) for flag, q, y, inverse in zip(active, found.load, left, factors.per_slope)
+    ], found.approach
 
 
 def _corrected(
@@ -248,13 +246,15 @@ def _corrected(
     """One Newton step of coupled slices, as a correction of what is left of the conditions in single precision."""
     active, carried = active_of(problem, v), carried_by(v)
     missing = None if problem.load is None else problem.load - total(problem, carried)
-    rest = _cast(([-(y + c * q) for y, c, q in zip(left, secant, carried)], left, missing), jnp.float32)
+    still = None if problem.approach is None else jnp.zeros_like(approach)
+    given = [-(y + c * q) for y, c, q in zip(left, secant, carried)], left, missing, still
+    known, left, missing, still = _cast(given, jnp.float32)
     factors = eliminate(single, active, slope)
-    assert isinstance(factors, CoupledFactors)
-    added, more, left = _cast(correction(single, factors, *rest), approach.dtype)
+    found = respond(single, factors, known, load=missing, approach=still)
+    left = left_after(single, found, left)
+    added, more, left, per_slope = _cast((found.load, found.approach, left, factors.per_slope), approach.dtype)
     return [
-        jnp.where(flag, q + x, -y * inverse)
-        for flag, q, x, y, inverse in zip(active, carried, added, left, _cast(factors.per_slope, approach.dtype))
+        jnp.where(flag, q + x, -y * inverse) for flag, q, x, y, inverse in zip(active, carried, added, left, per_slope)
     ], approach + more
 
 
@@ -265,7 +265,7 @@ def _residual(problem: ContactProblem, load: Rows, approach: Curve, secant: Slop
     load below which springs are linear.
     """
     worst, scale, softest = jnp.zeros_like(approach), jnp.abs(common), jnp.zeros_like(approach)
-    for q, y, c, lever, own in zip(load, left, secant, problem.levers, problem.own_compliance):
+    for q, y, c, lever, own in zip(load, left, secant, problem.lever, problem.own_compliance):
         mismatch = y + c * q
         closing = jnp.abs(mismatch + lever * approach[None])
         worst = jnp.maximum(worst, jnp.max(jnp.where(q > 0, jnp.abs(mismatch), -mismatch), axis=0))

@@ -14,7 +14,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
 from .coupling import SliceCoupling
-from .elimination import Rows, Slopes, over_slices
+from .elimination import Rows, Slopes
 
 Real = Float[Array, "..."]
 
@@ -23,7 +23,7 @@ LOAD_FLOOR = 1e-2
 
 
 class AbstractSpring(eqx.Module):
-    """A deflection that increases with the load, elementwise; every leaf has shape (pairs, 1 or slices, positions)."""
+    """A deflection that increases with the load, elementwise; leaves have shape (springs, 1 or slices, positions)."""
 
     @abstractmethod
     def secant(self, load: Real) -> Real:
@@ -49,8 +49,8 @@ class Known(NamedTuple):
         line_load, opening, approach: as in `ContactSolution`.
     """
 
-    line_load: Float[Array, "pairs slices positions"]
-    opening: Float[Array, "pairs slices positions"]
+    line_load: Float[Array, "springs slices positions"]
+    opening: Float[Array, "springs slices positions"]
     approach: Float[Array, " positions"]
 
 
@@ -58,30 +58,27 @@ class ContactProblem(eqx.Module):
     """Data of the contact problem.
 
     Attributes:
-        compliance: C, shape (pairs, pairs, positions); or of every slice, (pairs, pairs, slices, positions), where
-            slices are not coupled. Where only some of the springs can touch (`SliceCoupling.alternation`) it is that of
-            all, and what follows is of these alone.
+        compliance: C, of every slice on its own, shape (springs, springs, 1 or slices, positions).
         law: deflection h(q) of every spring.
-        gap: gap of every spring without load, shape (pairs, slices, positions).
-        lever: closing of a spring per unit of common approach, positive, shape (pairs, positions) or (pairs, slices,
-            positions).
+        gap: gap of every spring without load, shape (springs, slices, positions).
+        lever: closing of a spring per unit of common approach, positive, shape (springs, 1 or slices, positions).
         weight: width of each slice, shape (slices,).
         load: total load, scalar or shape (positions,); None where the approach is prescribed.
         approach: prescribed common approach d, shape (positions,); None where the load is.
         start_law: law that the solution starts from, close to h and shared by many problems, so that it is evaluated
             once for all of them; None for h.
-        coupling: elastic coupling of the slices, its `weight` being `weight` over the mean of all slices (None for
-            equal weights); None where slices only have the approach in common.
+        coupling: deflection of the slices under the loads of each other, and of their support; None where they only
+            have the approach in common.
         known: solution of the problem where it has been found before; None where it is sought.
 
     Raises:
         ValueError: unless one of load and approach is given.
     """
 
-    compliance: Float[Array, "springs springs *own positions"]
+    compliance: Float[Array, "springs springs #slices positions"]
     law: AbstractSpring
-    gap: Float[Array, "pairs slices positions"]
-    lever: Float[Array, "pairs *each positions"]
+    gap: Float[Array, "springs slices positions"]
+    lever: Float[Array, "springs #slices positions"]
     weight: Float[Array, " slices"]
     load: Float[Array, ""] | Float[Array, " positions"] | None = None
     approach: Float[Array, " positions"] | None = None
@@ -94,37 +91,36 @@ class ContactProblem(eqx.Module):
             raise ValueError("ContactProblem: one of load and approach must be given")
 
     @property
-    def levers(self) -> Float[Array, "pairs #slices positions"]:
-        """Levers of the springs, with an axis of slices."""
-        return over_slices(self.lever)
+    def relative_weight(self) -> Float[Array, " slices"]:
+        """Width of each slice over the mean of all."""
+        return self.weight / jnp.mean(self.weight)
 
     @property
-    def own_compliance(self) -> Float[Array, "pairs #slices positions"]:
-        """C of every spring on its own."""
-        if self.coupling is not None:
-            return self.coupling.own(self.compliance)
-        return over_slices(jnp.stack([self.compliance[i, i] for i in range(len(self.compliance))]))
+    def own_compliance(self) -> Float[Array, "springs #slices positions"]:
+        """Deflection of every spring under an even load of its own."""
+        own = jnp.stack([self.compliance[i, i] for i in range(len(self.compliance))])
+        return own if self.coupling is None else own + self.coupling.own(len(own))
 
 
 class ContactSolution(eqx.Module):
     """Line loads, common approach, what is left of the gaps, and how well the conditions hold.
 
     Attributes:
-        line_load: q, shape (pairs, slices, positions).
+        line_load: q, shape (springs, slices, positions).
         approach: d, shape (positions,).
         load: total load, shape (positions,).
-        opening: y without the spring's own deflection, C q + gap - lever d, shape (pairs, slices, positions): the
+        opening: y without the spring's own deflection, C q + gap - lever d, shape (springs, slices, positions): the
             remaining gap where it is positive, minus the contact deflection h(q) where the spring is loaded.
-        in_contact: which springs carry load, shape (pairs, slices, positions).
+        in_contact: which springs carry load, shape (springs, slices, positions).
         residual: largest violation of any condition, relative to the approach and to the load, shape (positions,).
         converged: whether the residual is as small as it has to be, shape (positions,).
     """
 
-    line_load: Float[Array, "pairs slices positions"]
+    line_load: Float[Array, "springs slices positions"]
     approach: Float[Array, " positions"]
     load: Float[Array, " positions"]
-    opening: Float[Array, "pairs slices positions"]
-    in_contact: Bool[Array, "pairs slices positions"]
+    opening: Float[Array, "springs slices positions"]
+    in_contact: Bool[Array, "springs slices positions"]
     residual: Float[Array, " positions"]
     converged: Bool[Array, " positions"]
 
@@ -153,6 +149,6 @@ def slopes_under(problem: ContactProblem, load: Rows, secant: Slopes) -> Slopes:
     return list(jnp.where(q > LOAD_FLOOR, problem.law.slope(jnp.maximum(q, LOAD_FLOOR), c), c))
 
 
-def deflections_under(problem: ContactProblem, load: Rows) -> Float[Array, "pairs slices positions"]:
+def deflections_under(problem: ContactProblem, load: Rows) -> Float[Array, "springs slices positions"]:
     """Deflection of every spring."""
     return problem.law.deflection(jnp.stack(load))

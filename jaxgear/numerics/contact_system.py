@@ -1,33 +1,38 @@
 """The linear systems of a contact problem, with coupled slices or not, and what its loads deflect."""
 
+from typing import NamedTuple
+
 import equinox as eqx
 import jax.numpy as jnp
 
 from .contact_problem import ContactProblem
-from .coupling import CoupledFactors, Response, couple, respond, stiffness, with_inverses
-from .elimination import (
-    Active,
-    Curve,
-    Factors,
-    Load,
-    Rows,
-    Slopes,
-    at_approach,
-    balance,
-    factorize,
-    over_slices,
-    product,
-)
+from .coupling import CoupledFactors, couple, pressed_by, stiffness, with_inverse
+from .elimination import Active, Curve, Inverse, Load, Rows, Slopes, inverse_of
+from .safe import unit
 
 
 def eliminable(problem: ContactProblem) -> ContactProblem:
     """The problem with what its eliminations need to be evaluated once."""
     if problem.coupling is None:
         return problem
-    return eqx.tree_at(lambda p: p.coupling, problem, with_inverses(problem.coupling, problem.compliance))
+    return eqx.tree_at(lambda p: p.coupling, problem, with_inverse(problem.coupling))
 
 
-def eliminate(problem: ContactProblem, active: Active, slope: Slopes) -> Factors | CoupledFactors:
+class Factors(NamedTuple):
+    """The system of the active springs, eliminated.
+
+    Attributes:
+        inverse: of C + slope, of every slice on its own; zero where springs are apart.
+        per_slope: load per opening of every spring, about.
+        coupled: what couples the slices.
+    """
+
+    inverse: Inverse
+    per_slope: Slopes
+    coupled: CoupledFactors | None
+
+
+def eliminate(problem: ContactProblem, active: Active, slope: Slopes) -> Factors:
     """Eliminates the active springs of an `eliminable` problem.
 
     Args:
@@ -35,72 +40,71 @@ def eliminate(problem: ContactProblem, active: Active, slope: Slopes) -> Factors
         active: which springs are in contact, (slices, positions) each.
         slope: of the springs.
     """
+    inverse, per_slope = inverse_of(problem.compliance, active, slope)
     if problem.coupling is None:
-        return factorize(problem.compliance, problem.lever, active, slope)
-    assert problem.coupling.held is not None
-    return couple(problem.coupling, problem.lever, factorize(problem.coupling.held.local, problem.lever, active, slope))
+        return Factors(inverse, per_slope, None)
+    inverse = [[x / unit(x) for x in row] for row in inverse]  # read by several loops
+    return Factors(inverse, per_slope, couple(problem.coupling, problem.relative_weight, problem.lever, inverse))
 
 
-def given_load(
-    problem: ContactProblem, factors: Factors | CoupledFactors, known: Rows, load: Load
-) -> tuple[Rows, Curve]:
-    """Line loads of the active springs and approach: deflection + slope x load = known + lever x approach."""
-    if isinstance(factors, CoupledFactors):
-        return respond(problem.weight, factors, known, load=load)[:2]
-    return balance(problem.weight, factors, known, load)
+class Response(NamedTuple):
+    """Line loads, common approach, and what presses the slices besides what is known."""
+
+    load: Rows
+    approach: Curve
+    pressed: Rows
 
 
-def given_approach(problem: ContactProblem, factors: Factors | CoupledFactors, known: Rows, approach: Curve) -> Rows:
-    """Line loads of the active springs."""
-    if isinstance(factors, CoupledFactors):
-        return respond(problem.weight, factors, known, approach=approach).load
-    return at_approach(factors, known, approach)
-
-
-def step(problem: ContactProblem, factors: Factors | CoupledFactors, known: Rows) -> tuple[Rows, Curve, Rows]:
-    """Line loads of the active springs, approach and `opening` for what the problem prescribes."""
-    if not isinstance(factors, CoupledFactors):
-        if problem.approach is not None:
-            load, approach = at_approach(factors, known, problem.approach), problem.approach
-        else:
-            assert problem.load is not None  # one of both is given
-            load, approach = balance(problem.weight, factors, known, problem.load)
-        return load, approach, opening(problem, load, approach)
-    found = respond(problem.weight, factors, known, load=problem.load, approach=problem.approach)
-    return found.load, found.approach, _left(factors, found, list(problem.gap))
-
-
-def correction(
-    problem: ContactProblem, factors: CoupledFactors, known: Rows, left: Rows, missing: Curve | None
-) -> tuple[Rows, Curve, Rows]:
-    """Changes of line loads and approach in a step with coupled slices, and `opening` after the step.
+def respond(
+    problem: ContactProblem,
+    factors: Factors,
+    known: Rows,
+    *,
+    load: Load | None = None,
+    approach: Curve | None = None,
+) -> Response:
+    """Solves deflection + slope x load = known + lever x approach on the active springs.
 
     Args:
         problem: the data.
-        factors: factors of the active springs.
-        known: remaining overlap of the active springs.
-        left: `opening` before the step.
-        missing: prescribed load minus the present one; None where the approach is prescribed.
+        factors: from `eliminate`.
+        known: right side; it does not count where springs are apart.
+        load: total load; None where the approach is given.
+        approach: None where the load is given.
     """
-    approach = None if missing is not None else jnp.zeros_like(problem.gap[0, 0])
-    found = respond(problem.weight, factors, known, load=missing, approach=approach)
-    return found.load, found.approach, _left(factors, found, left)
+    within = _times(factors.inverse, known)
+    if factors.coupled is None:
+        rigid = _times(factors.inverse, list(problem.lever))
+        if approach is None:
+            approach = (load - total(problem, within)) / total(problem, rigid)
+        pressed = [lever * approach[None] for lever in problem.lever]
+        return Response([row + x * approach[None] for row, x in zip(within, rigid)], approach, pressed)
+    assert problem.coupling is not None
+    kept = unit(factors.inverse[0][0])
+    within = [row / kept for row in within]
+    mean = None if load is None else load / jnp.mean(problem.weight)
+    given = problem.coupling, problem.relative_weight, problem.lever, factors.coupled, within
+    pressed, approach = pressed_by(*given, load=mean, approach=approach)
+    pressed = [row / kept for row in pressed]
+    added = _times(factors.inverse, pressed)
+    return Response([row + more for row, more in zip(within, added)], approach, pressed)
 
 
-def _left(factors: CoupledFactors, found: Response, gap: Rows) -> Rows:
-    held = factors.coupling.held
-    assert held is not None  # set by `with_inverses` before every elimination
-    return [
-        sum(c * q for c, q in zip(row, found.load)) + start - pressed
-        for row, start, pressed in zip(held.local_slices, gap, found.pressed)
-    ]
+def _times(matrix: Inverse, rows: Rows) -> Rows:
+    return [sum(x * row for x, row in zip(each, rows)) for each in matrix]
 
 
-def load_per_approach(problem: ContactProblem, factors: Factors | CoupledFactors) -> Curve:
+def left_after(problem: ContactProblem, found: Response, before: Rows) -> Rows:
+    """`opening` after a step that has changed the loads by those found, from that `before`: the gap for a whole one."""
+    own = _times(problem.compliance, found.load)
+    return [y + start - pressed for y, start, pressed in zip(own, before, found.pressed)]
+
+
+def load_per_approach(problem: ContactProblem, factors: Factors) -> Curve:
     """d load / d approach of the active springs."""
-    if isinstance(factors, CoupledFactors):
-        return stiffness(problem.weight, factors)
-    return product(problem.weight, factors, factors.lever, factors.lever)
+    if factors.coupled is not None:
+        return jnp.sum(problem.weight) * stiffness(factors.coupled)
+    return total(problem, _times(factors.inverse, list(problem.lever)))
 
 
 def opening(problem: ContactProblem, load: Rows, approach: Curve) -> Rows:
@@ -109,18 +113,14 @@ def opening(problem: ContactProblem, load: Rows, approach: Curve) -> Rows:
 
 
 def without_gap(problem: ContactProblem, load: Rows, approach: Curve) -> Rows:
-    """Part of `opening` that load and approach cause: C q - lever d, without the initial gap."""
+    """Part of `opening` that load and approach cause: deflection - lever d, without the initial gap."""
+    deflected = _times(problem.compliance, load)
     if problem.coupling is not None:
-        deflected = problem.coupling.deflection(problem.compliance, problem.lever, load)
-        return [row - lever * approach[None] for row, lever in zip(deflected, problem.levers)]
-    result = []
-    for row, lever in zip(problem.compliance, problem.levers):
-        result.append(sum(c * q for c, q in zip(over_slices(row), load)) - lever * approach[None])
-    return result
+        further = problem.coupling.deflection(problem.relative_weight, problem.lever, load)
+        deflected = [own + more for own, more in zip(deflected, further)]
+    return [row - lever * approach[None] for row, lever in zip(deflected, problem.lever)]
 
 
 def total(problem: ContactProblem, load: Rows) -> Curve:
     """Total load of the line loads, times lever and slice width."""
-    if problem.lever.ndim == 3:
-        return jnp.sum(problem.weight[:, None] * sum(lever * q for lever, q in zip(problem.lever, load)), axis=0)
-    return sum(lever * jnp.sum(problem.weight[:, None] * q, axis=0) for lever, q in zip(problem.lever, load))
+    return jnp.sum(problem.weight[:, None] * sum(lever * q for lever, q in zip(problem.lever, load)), axis=0)

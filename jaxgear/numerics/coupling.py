@@ -1,25 +1,24 @@
 """Coupled slices of a contact problem, by few modes over the slices, and the elimination of their unknowns.
 
-The deflection of spring p in slice s under all line loads is
+Beside what every slice deflects on its own (`ContactProblem.compliance`), the deflection of spring p in slice s under
+all line loads is
 
-    y[p, s] = sum_j C[p, j] ( rest q[j, s] + sum_{k, l, t} V[s, k] M[k, l] V[t, l] q[j, t] )
-            + lever[p] sum_{k, l, t} R[s, k] H[k, l] R[t, l] sum_j lever[j] q[j, t]:
+    y[p, s] = D[p, s] sum_{b, j, k, l, t} V[s, k] M_b[k, l] C_b[p, j] V[t, l] D[j, t] w[t] q[j, t]
+            + lever[p, s] sum_{k, l, t} R[s, k] H[k, l] R[t, l] w[t] sum_j lever[j, t] q[j, t]:
 
-springs on bodies whose deflection at one place is felt at others, on a support that deflects under the force of all
-springs of a slice. Where the two bodies that make up C spread loads in their own way each, a second sum of this form
-follows, with the C of one of them and by how much its M and rest differ. Of slices of unequal weight, w times the line
-load of slice t stands for q in the sums over t, w being the weight over the mean of all.
+springs on bodies b whose deflection at one place is felt at others, on a support that deflects under the force of all
+springs of a slice; w is the width of a slice over the mean of all. There may be more places p on the bodies than
+springs in a slice: spring r then touches at one of the places r, r + springs, ..., and D is zero at the others.
 
-Every slice is eliminated on its own, as if nothing but the rest of the compliance held it: A = rest C + slope. With the
-deflections p of the modes as unknowns, and b those of the support with the common approach in the first one, the active
+Every slice is eliminated on its own, as if nothing but its own compliance held it: A = own compliance + slope. With the
+deflections m of the modes as unknowns, and b those of the support with the common approach in the first one, the active
 springs obey
 
-    A q = known + X b - V p,     (C^-1 x M^-1) p = V^T q,     b = sqrt(n) approach e_1 - H z,     z = X^T q,
+    A q = known + X b - D V m,     K^-1 m = (D V)^T w q,     b = sqrt(n) approach e_1 - H z,     z = X^T w q,
 
-X being the levers times the support's modes. Where slices differ in weight, w q is solved for in place of q, by
-w A^-1 in place of A^-1, w being the weight over the mean of all. So p follows from the symmetric, positive definite
-matrix C^-1 x M^-1 + V^T A^-1 V, a few unknowns at every position, and what is left are the equations of the support.
-What several loops read ends with a division, for compilers to store it.
+K being the sum of M_b x C_b over the bodies and X the levers times the support's modes. So m follows from the
+symmetric, positive definite matrix K^-1 + (D V)^T w A^-1 D V, a few unknowns at every position, and what is left are
+the equations of the support. What several loops read ends with a division, for compilers to store it.
 """
 
 from functools import reduce
@@ -32,53 +31,26 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from .alternation import Alternation
 from .dense import solve_dense
-from .elimination import Curve, Factors, Load, Rows, Slopes, inverse_of, over_slices, small_inverse
+from .elimination import Curve, Inverse, Load, Rows, small_inverse
 from .safe import stored, unit
 
-Springs = Float[Array, "springs springs *own positions"]
-Blocks = Float[Array, "modes modes springs springs positions"]
-Levers = Float[Array, "pairs *each positions"]
+Places = Float[Array, "places places positions"]
+Blocks = Float[Array, "modes modes places places positions"]
+Levers = Float[Array, "springs #slices positions"]
+Weight = Float[Array, " slices"]
 
 
-class Held(NamedTuple):
-    """Inverses and products of a coupling that its eliminations share.
-
-    Attributes:
-        local: rest C, summed over both bodies, of the springs that can touch; with an axis of slices where they are
-            scaled.
-        inverse: inverse of C.
-        share_inverse: inverse of M.
-        modal: inverse of the sum of M x C over both bodies, where there is an `other`; None without one.
-    """
-
-    local: Float[Array, "pairs pairs *own positions"]
-    inverse: Springs
-    share_inverse: Float[Array, "modes modes"]
-    modal: Blocks | None = None
-
-    @property
-    def local_slices(self) -> Float[Array, "pairs pairs #slices positions"]:
-        """`local` with an axis of slices."""
-        return self.local if self.local.ndim == 4 else self.local[:, :, None]
-
-    def column(self, mode: int) -> Float[Array, "rows springs springs positions"]:
-        """Inverse of M x C in the columns of a mode, from the rows of this mode on."""
-        if self.modal is not None:
-            return self.modal[mode:, mode]
-        return self.share_inverse[mode:, mode, None, None, None] * self.inverse[None]
-
-
-class Other(eqx.Module):
-    """Difference between the load spreading of one of two bodies and that of the other.
+class Body(NamedTuple):
+    """How a body spreads the loads of springs.
 
     Attributes:
-        compliance: C of the body that differs.
-        share, rest: its M and rest, minus those of `SliceCoupling`; the sum over both bodies is positive definite.
+        compliance: C, under a load that is the same in all slices.
+        share: M, symmetric and positive definite; the share of C that acts on the modes beyond `rest`.
+        rest: share of C that acts on every slice alone.
     """
 
-    compliance: Springs
+    compliance: Places
     share: Float[Array, "modes modes"]
     rest: Float[Array, ""]
 
@@ -87,97 +59,76 @@ class SliceCoupling(eqx.Module):
     """How slices are elastically coupled.
 
     Attributes:
-        modes: V, orthonormal, the constant first; with the weights w of the slices, V^T w V = 1, where they differ.
-        share: M, symmetric and positive definite.
-        rest: share of C that acts on loads orthogonal to the modes, slice by slice.
+        modes: V, the constant first, with the weights w of the slices V^T w V = 1.
+        bodies: that the springs act on; K, the sum over all, is positive definite.
+        scale: D, of loads and deflections at every place, where a body is stiffer at one than at another; zero where a
+            spring touches elsewhere. None for one throughout.
         support_modes: R, orthonormal likewise, the constant first; None without a support.
         support: H, symmetric and positive semi-definite, the deflection under line loads; None without a support.
-        crosswise: whether H only joins the even deflection with one other shape, zero but off its diagonal.
-        other: of two bodies that spread loads in their own way each; None where both do alike.
-        weight: w of the slices, over their mean; None where all are equal.
-        scale: D, of loads and deflections of every spring, where a body is stiffer at one place than at another: D C D
-            stands for C; None where it is not. Of the springs that can touch alone, where there are others.
-        alternation: which springs can touch, where only some can: loads, deflections, levers and scales then are those
-            of these two; None where all can.
-        held: for eliminations, see `with_inverses`; None before.
+        inverse: of K, for eliminations, see `with_inverse`; None before.
     """
 
     modes: Float[Array, "slices modes"]
-    share: Float[Array, "modes modes"]
-    rest: Float[Array, ""]
+    bodies: tuple[Body, ...]
+    scale: Float[Array, "places slices positions"] | None = None
     support_modes: Float[Array, "slices bends"] | None = None
     support: Float[Array, "bends bends"] | None = None
-    crosswise: bool = eqx.field(static=True, default=False)
-    other: Other | None = None
-    weight: Float[Array, " slices"] | None = None
-    scale: Float[Array, "pairs slices positions"] | None = None
-    alternation: Alternation | None = None
-    held: Held | None = None
+    inverse: Blocks | None = None
 
-    def deflection(self, compliance: Springs, lever: Levers, load: Rows) -> Rows:
-        """y under line loads."""
-        scaled = self.springs(self.scaled(load))
-        result = self._spread(compliance, self.share, self.rest, scaled)
-        if self.other is not None:
-            more = self._spread(self.other.compliance, self.other.share, self.other.rest, scaled)
-            result = [row + added for row, added in zip(result, more)]
-        result = self.scaled(self.touching(result))
-        bent = self.support_deflection(lever, load)
-        return result if bent is None else [row + height * bent for row, height in zip(result, over_slices(lever))]
+    def local(self, springs: int) -> Float[Array, "springs springs #slices positions"]:
+        """Compliance of every slice on its own, of so many springs in each."""
+        local = reduce(add, [body.rest * body.compliance for body in self.bodies])[:, :, None]
+        if self.scale is None:
+            return local
+        local = local * self.scale[:, None] * self.scale[None]
+        rows = [[jnp.sum(local[i::springs, j::springs], (0, 1)) for j in range(springs)] for i in range(springs)]
+        return jnp.stack([jnp.stack(row) for row in rows])
 
-    def scaled(self, rows: Rows) -> Rows:
-        """Rows of the springs times their scale."""
-        return rows if self.scale is None else [d * row for d, row in zip(self.scale, rows)]
+    def own(self, springs: int) -> Float[Array, "springs #slices positions"]:
+        """Deflection of every spring under an even load of its own, beyond that of the slices on their own."""
+        even = reduce(add, [body.share[0, 0] * body.compliance for body in self.bodies])
+        own = [even[i, i][None] for i in range(len(even))]
+        return jnp.stack(own if self.scale is None else self.springs(list(self.scale * jnp.stack(own)), springs))
 
-    def springs(self, rows: Rows) -> Rows:
-        """Rows of all springs from rows of those that can touch."""
-        return rows if self.alternation is None else self.alternation.springs(rows)
+    def places(self, rows: Rows) -> Rows:
+        """Loads at all places from those of the springs."""
+        return rows if self.scale is None else [d * rows[i % len(rows)] for i, d in enumerate(self.scale)]
 
-    def touching(self, springs: Rows) -> Rows:
-        """Rows of the springs that can touch from rows of all springs."""
-        return springs if self.alternation is None else list(self.alternation.rows(jnp.stack(springs)))
+    def springs(self, places: Rows, count: int) -> Rows:
+        """Deflections of so many springs from those of all places."""
+        if self.scale is None:
+            return places
+        rows = [d * row for d, row in zip(self.scale, places)]
+        return [sum(rows[first + count :: count], rows[first]) for first in range(count)]
 
-    def own(self, compliance: Springs) -> Float[Array, "pairs #slices positions"]:
-        """Compliance of every spring on its own."""
-        own = over_slices(jnp.stack([compliance[i, i] for i in range(len(compliance))]))
-        own = own if self.alternation is None else self.alternation.rows(own)
-        return own if self.scale is None else own * self.scale**2
+    def deflection(self, weight: Weight, lever: Levers, load: Rows) -> Rows:
+        """y under line loads, beyond that of the slices on their own."""
+        modal = stored(jnp.stack([onto(weight[:, None] * self.modes, row) for row in self.places(load)], axis=1))
+        pressed = [along(body.share, summed(body.compliance[None] * modal[:, None], 2)) for body in self.bodies]
+        deflected = along(self.modes, stored(reduce(add, pressed)))
+        result = self.springs([deflected[:, i] for i in range(deflected.shape[1])], len(load))
+        bent = self.support_deflection(weight, lever, load)
+        return result if bent is None else [row + height * bent for row, height in zip(result, lever)]
 
-    def _spread(self, compliance: Springs, share: Float[Array, "modes modes"], rest, load: Rows) -> Rows:
-        uniform = [stored(sum(c[None] * q for c, q in zip(row, load))) for row in compliance]
-        spread = self.modes @ share
-        modal = [stored(onto(self.modes, self.weighted(row))) for row in uniform]
-        return [stored(rest * row + along(spread, each)) for row, each in zip(uniform, modal)]
-
-    def weighted(self, row: Float[Array, "slices positions"]) -> Float[Array, "slices positions"]:
-        """w times values of the slices."""
-        return row if self.weight is None else self.weight[:, None] * row
-
-    def support_deflection(self, lever: Levers, load: Rows) -> Float[Array, "slices positions"] | None:
+    def support_deflection(self, weight: Weight, lever: Levers, load: Rows) -> Float[Array, "slices positions"] | None:
         """Deflection of the support under line loads, per unit of lever; None without a support."""
         if self.support is None or self.support_modes is None:
             return None
-        force = self.weighted(sum(height * q for height, q in zip(over_slices(lever), load)))
+        force = weight[:, None] * sum(height * q for height, q in zip(lever, load))
         return along(self.support_modes, along(self.support, onto(self.support_modes, force)))
 
 
-def with_inverses(coupling: SliceCoupling, compliance: Springs) -> SliceCoupling:
-    """The coupling ready for eliminations; C has to be positive definite."""
-    share = small_inverse(coupling.share[..., None])[..., 0]
-    held = Held(coupling.rest * compliance, small_inverse(compliance), share)
-    if coupling.other is not None:
-        other = coupling.other
-        both = _blocks(coupling.share, compliance) + _blocks(other.share, other.compliance)
-        held = held._replace(local=held.local + other.rest * other.compliance, modal=_block_inverse(both))
-    if coupling.alternation is not None:
-        held = held._replace(local=coupling.alternation.matrix(held.local))
-    if coupling.scale is not None:
-        of_slices = coupling.scale[:, None] * coupling.scale[None]
-        held = held._replace(local=held.local_slices * of_slices)
-    return eqx.tree_at(lambda c: c.held, coupling, held, is_leaf=lambda leaf: leaf is None)
+def with_inverse(coupling: SliceCoupling) -> SliceCoupling:
+    """The coupling ready for eliminations."""
+    if len(coupling.bodies) == 1:
+        (body,) = coupling.bodies
+        inverse = _block(small_inverse(body.share[..., None])[..., 0], small_inverse(body.compliance))
+    else:
+        inverse = _block_inverse(reduce(add, [_block(body.share, body.compliance) for body in coupling.bodies]))
+    return eqx.tree_at(lambda c: c.inverse, coupling, inverse, is_leaf=lambda leaf: leaf is None)
 
 
-def _blocks(share: Float[Array, "modes modes"], compliance: Springs) -> Blocks:
+def _block(share: Float[Array, "modes modes"], compliance: Places) -> Blocks:
     return share[:, :, None, None, None] * compliance[None, None]
 
 
@@ -237,8 +188,7 @@ def along(
 
 
 Bends = Float[Array, "bends positions"]
-Inverse = list[list[Float[Array, "slices positions"]]]  # of every slice on its own, by springs
-Sides = Float[Array, "sides springs positions"]  # right sides of the modal system, of one mode
+Sides = Float[Array, "sides places positions"]  # right sides of the modal system, of one mode
 
 
 class _Block(NamedTuple):
@@ -250,89 +200,69 @@ class _Block(NamedTuple):
         inverse: of D.
     """
 
-    scaled: Float[Array, "modes springs springs positions"]
-    lower: Float[Array, "below springs springs positions"]
-    inverse: Float[Array, "springs springs positions"]
+    scaled: Float[Array, "modes places places positions"]
+    lower: Float[Array, "below places places positions"]
+    inverse: Float[Array, "places places positions"]
 
 
 class CoupledFactors(NamedTuple):
-    """The active system, eliminated.
+    """What couples the slices, eliminated.
 
     Attributes:
-        coupling: of the slices.
-        lever: of the springs.
-        inverse: of the matrices A, zero where springs are apart, by springs; with the weights of the slices.
         blocks: of the modal system.
-        bent: L^-1 V^T A^-1 X by mode, and D^-1 times it.
+        bent: L^-1 (D V)^T w A^-1 X by mode, and D^-1 times it.
         force: z under unit b, symmetric.
         yielding: b under unit H z, and under unit approach in its first column; see `_yielding`.
-        per_slope: load per opening of every spring, about.
     """
 
-    coupling: SliceCoupling
-    lever: Levers
-    inverse: Inverse
     blocks: list[_Block]
     bent: tuple[list[Sides], list[Sides]]
     force: Float[Array, "bends bends positions"]
     yielding: Float[Array, "bends bends positions"]
-    per_slope: Slopes
 
 
-class Response(NamedTuple):
-    """Line loads, common approach, and what presses the slices besides what is known: X b - V p."""
-
-    load: Rows
-    approach: Curve
-    pressed: Rows
-
-
-def couple(coupling: SliceCoupling, lever: Levers, own: Factors) -> CoupledFactors:
+def couple(coupling: SliceCoupling, weight: Weight, lever: Levers, inverse: Inverse) -> CoupledFactors:
     """Eliminates what couples the slices.
 
     Args:
-        coupling: with its inverses.
+        coupling: with its inverse.
+        weight: w.
         lever: what a spring closes per unit of common approach.
-        own: elimination of every slice with the local compliance and the slopes of the springs.
+        inverse: A^-1, zero where springs are apart, by springs.
     """
-    inverse = inverse_of(own)
-    if coupling.weight is not None:
-        inverse = [[coupling.weighted(x) for x in row] for row in inverse]
-    modal = _products(coupling, _scaled_both(coupling, inverse))
+    modal = _products(coupling, weight, inverse)
     blocks = _eliminated(coupling, modal)
-    right, force = _of_support(coupling, lever, inverse, modal)
+    right, force = _of_support(coupling, weight, lever, inverse, modal)
     bent = _ahead(blocks, right)
     force = force - _joined(bent[0], bent[1])
-    yielding = _yielding(coupling.support, force)
-    return CoupledFactors(coupling, lever, inverse, blocks, bent, force, yielding, own.per_slope)
+    return CoupledFactors(blocks, bent, force, _yielding(coupling.support, force))
 
 
-def _scaled_both(coupling: SliceCoupling, inverse: Inverse) -> Inverse:
-    """D inverse D, with the scales of the springs."""
-    if coupling.scale is None:
-        return inverse
-    return [[d * x * other for x, other in zip(row, coupling.scale)] for d, row in zip(coupling.scale, inverse)]
+def _products(
+    coupling: SliceCoupling, weight: Weight, inverse: Inverse
+) -> list[Float[Array, "_ places places positions"]]:
+    """(D V)^T w A^-1 D V: of every mode with itself and those after it, by mode."""
+    modes, scale, springs = coupling.modes, coupling.scale, len(inverse)
+    places = range(springs if scale is None else len(scale))
+    half = [(i, j) for i in places for j in range(i + 1)]
+    rows = [inverse[i % springs][j % springs] for i, j in half]
+    if scale is not None:
+        # two places of one spring have no load at the same time
+        rows = [
+            scale[i] * row * scale[j] if i == j or (i - j) % springs else jnp.zeros_like(row)
+            for (i, j), row in zip(half, rows)
+        ]
+    stack = jnp.stack(rows)
+    place = np.array([[half.index((max(i, j), min(i, j))) for j in places] for i in places])
+    loads = weight[:, None] * modes
+    return [onto(loads[:, k, None] * modes[:, k:], stack)[:, place] for k in range(modes.shape[1])]
 
 
-def _products(coupling: SliceCoupling, rows: Inverse) -> list[Float[Array, "_ springs springs positions"]]:
-    """V^T rows V: of every mode with itself and those after it, by mode."""
-    modes, alternation = coupling.modes, coupling.alternation
-    springs = range(len(rows) if alternation is None else len(alternation.chosen))
-    half = [(i, j) for i in springs for j in range(i + 1)]
-    if alternation is None:
-        stack = jnp.stack([rows[i][j] for i, j in half])
-    else:
-        stack = jnp.stack([jnp.where(alternation.together(i, j), rows[i % 2][j % 2], 0.0) for i, j in half])
-    place = np.array([[half.index((max(i, j), min(i, j))) for j in springs] for i in springs])
-    return [onto(mode[:, None] * modes[:, k:], stack)[:, place] for k, mode in enumerate(modes.T)]
-
-
-def _eliminated(coupling: SliceCoupling, modal: list[Float[Array, "_ springs springs positions"]]) -> list[_Block]:
-    held = coupling.held
+def _eliminated(coupling: SliceCoupling, modal: list[Float[Array, "_ places places positions"]]) -> list[_Block]:
     blocks: list[_Block] = []
-    assert held is not None  # set by `with_inverses` before every elimination
+    assert coupling.inverse is not None  # set by `with_inverse` before every elimination
     for mode in range(len(modal)):
-        scaled = modal[mode] + held.column(mode)
+        scaled = modal[mode] + coupling.inverse[mode:, mode]
         for before, block in enumerate(blocks):
             ahead = mode - before
             scaled = scaled - _times(block.lower[ahead - 1 :], jnp.swapaxes(block.scaled[ahead], 0, 1))
@@ -350,21 +280,20 @@ def _times(first: Float[Array, "... rows pairs positions"], second: Float[Array,
 
 
 def _of_support(
-    coupling: SliceCoupling, lever: Levers, inverse, modal
+    coupling: SliceCoupling, weight: Weight, lever: Levers, inverse: Inverse, modal
 ) -> tuple[list[Sides], Float[Array, "bends bends positions"]]:
-    """V^T A^-1 X by mode, and X^T A^-1 X."""
-    shapes = coupling.support_modes
-    if shapes is None and coupling.scale is None and coupling.alternation is None:
+    """(D V)^T w A^-1 X by mode, and X^T w A^-1 X."""
+    if coupling.support_modes is None and coupling.scale is None and lever.shape[1] == 1:
         # what the common approach presses is the first mode
-        even = reduce(add, [modal[0][:, :, i] * height[None, None] for i, height in enumerate(lever)])
-        return list(even[:, None]), reduce(add, list(even[0] * lever))[None, None]
-    heights = over_slices(lever)
-    shapes = _constant(coupling) if shapes is None else shapes
-    pressed = [sum(x * height for x, height in zip(row, heights)) for row in inverse]
-    modal_pressed = jnp.stack(coupling.springs(coupling.scaled(pressed)))
-    right = [onto(mode[:, None] * shapes, modal_pressed) for mode in coupling.modes.T]
-    force = sum(row * height for row, height in zip(pressed, heights))
-    return right, jnp.stack([onto(shape[:, None] * shapes, force) for shape in shapes.T])
+        even = reduce(add, [modal[0][:, :, i] * height[None] for i, height in enumerate(lever)])
+        return list(even[:, None]), reduce(add, list(even[0] * lever[:, 0]))[None, None]
+    shapes = _shapes(coupling)
+    pressed = [sum(x * height for x, height in zip(row, lever)) for row in inverse]
+    placed = jnp.stack(coupling.places(pressed))
+    loads = weight[:, None] * shapes
+    right = [onto(mode[:, None] * loads, placed) for mode in coupling.modes.T]
+    force = sum(row * height for row, height in zip(pressed, lever))
+    return right, jnp.stack([onto(load[:, None] * shapes, force) for load in loads.T])
 
 
 def _ahead(blocks: list[_Block], right: list[Sides]) -> tuple[list[Sides], list[Sides]]:
@@ -401,64 +330,68 @@ def _back(
     return [found[mode] for mode in range(len(blocks))]
 
 
-def respond(
-    weight: Float[Array, " slices"],
+def pressed_by(
+    coupling: SliceCoupling,
+    weight: Weight,
+    lever: Levers,
     factors: CoupledFactors,
-    known: Rows,
+    within: Rows,
     *,
     load: Load | None = None,
     approach: Curve | None = None,
-) -> Response:
-    """Solves for a load or for an approach; see the top."""
-    coupling = factors.coupling
-    inside = [sum(x * row for x, row in zip(rows, known)) for rows in factors.inverse]  # A^-1 known
-    kept = unit(factors.inverse[0][0])
-    within = [row / kept for row in inside]
-    stacked = jnp.stack(coupling.springs(coupling.scaled(within)))
+) -> tuple[Rows, Curve]:
+    """What presses the slices besides what is known, X b - D V m, and the approach.
+
+    Args:
+        coupling, weight, lever: as of `couple`.
+        factors: what that has found.
+        within: A^-1 known.
+        load: total of w times the line loads to reach; None for the one of an `approach`.
+        approach: the approach; None for that of a `load`.
+    """
+    placed = jnp.stack(coupling.places(within))
+    loads = weight[:, None] * coupling.modes
     # mode by mode: compilers take a sum for all modes in every loop that reads one of them
-    _, divided = _ahead(factors.blocks, [onto(mode[:, None], stacked) for mode in coupling.modes.T])
-    heights = over_slices(factors.lever)
-    force = sum(height * row for height, row in zip(heights, within))
-    shapes = _constant(coupling) if coupling.support_modes is None else coupling.support_modes
-    carried = onto(shapes, force) - _joined(factors.bent[0], divided)[:, 0]
-    mean = weight[0] if coupling.weight is None else weight[0] / coupling.weight[0]
-    bends, approach = _bends(factors, carried, None if load is None else load / mean, approach)
+    _, divided = _ahead(factors.blocks, [onto(mode[:, None], placed) for mode in loads.T])
+    force = sum(height * row for height, row in zip(lever, within))
+    shapes = _shapes(coupling)
+    carried = onto(weight[:, None] * shapes, force) - _joined(factors.bent[0], divided)[:, 0]
+    bends, approach = _bends(coupling, factors, carried, load, approach)
     eliminated = [a[0] + summed(b * bends[:, None]) for a, b in zip(divided, factors.bent[1])]
     deflected = along(coupling.modes, jnp.stack(_back(factors.blocks, eliminated)))
     even = along(shapes, bends)
-    yielded = coupling.scaled(coupling.touching([deflected[:, i] for i in range(deflected.shape[1])]))
-    pressed = [height * even - back for height, back in zip(heights, yielded)]
-    pressed = [row / kept for row in pressed]
-    loads = [row + sum(x * value for x, value in zip(rows, pressed)) for row, rows in zip(within, factors.inverse)]
-    if coupling.weight is not None:
-        loads = [row / coupling.weight[:, None] for row in loads]
-    return Response(loads, approach, pressed)
+    yielded = coupling.springs([deflected[:, i] for i in range(deflected.shape[1])], len(lever))
+    return [height * even - back for height, back in zip(lever, yielded)], approach
 
 
-def _constant(coupling: SliceCoupling) -> Float[Array, "slices 1"]:
-    """The even deflection of all slices, orthonormal: the support modes of slices without a support."""
+def _shapes(coupling: SliceCoupling) -> Float[Array, "slices bends"]:
+    """Support modes; the even deflection of all slices, orthonormal, of slices without a support."""
+    if coupling.support_modes is not None:
+        return coupling.support_modes
     count = len(coupling.modes)
     return jnp.full((count, 1), count**-0.5, coupling.modes.dtype)
 
 
-def stiffness(weight: Float[Array, " slices"], factors: CoupledFactors) -> Curve:
-    """Load per unit of approach."""
-    return jnp.sum(weight) * summed(factors.force[0] * factors.yielding[:, 0])
+def stiffness(factors: CoupledFactors) -> Curve:
+    """Mean load of the slices per unit of approach."""
+    return summed(factors.force[0] * factors.yielding[:, 0])
 
 
-def _bends(factors: CoupledFactors, carried: Bends, total, approach: Curve | None) -> tuple[Bends, Curve]:
+def _bends(
+    coupling: SliceCoupling, factors: CoupledFactors, carried: Bends, total, approach: Curve | None
+) -> tuple[Bends, Curve]:
     """b and the approach, for that or for a total of the line loads; `carried` is z at b = 0."""
-    root = factors.coupling.modes.shape[0] ** 0.5
-    still, rise = _still(factors, carried), factors.yielding[:, 0]
+    root = len(coupling.modes) ** 0.5
+    still, rise = _still(coupling, factors, carried), factors.yielding[:, 0]
     if approach is None:
         missing = total / root - carried[0] - summed(factors.force[0] * still)
         approach = missing / (root * summed(factors.force[0] * rise))
     return still + root * approach[None] * rise, approach
 
 
-def _still(factors: CoupledFactors, carried: Bends) -> Bends:
+def _still(coupling: SliceCoupling, factors: CoupledFactors, carried: Bends) -> Bends:
     """b without approach: (1 + H force) b = -H carried."""
-    support = factors.coupling.support
+    support = coupling.support
     if support is None:
         return jnp.zeros_like(carried)
     bent = jnp.tensordot(support, carried, 1)
