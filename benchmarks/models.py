@@ -87,7 +87,7 @@ def run(model: Model, cases: Sequence[Case]) -> dict[Case, Curves]:
 def curves_of(cycle: jg.MeshCycle) -> Curves:
     """What is compared, at the positions of the cycle."""
     force = np.asarray(cycle.pair_force)
-    corner = (np.asarray(cycle.kinematics.outside) > 0) & (force > 0)
+    corner = (np.asarray(cycle.kinematics.outside)[:, 0] > 0) & (force > 0)
     pressure = np.where(corner, np.nan, np.asarray(cycle.contact_pressure[:, 0]))
     te = np.asarray(cycle.transmission_error)
     return Curves(te, np.asarray(cycle.unloaded_transmission_error), force, pressure)

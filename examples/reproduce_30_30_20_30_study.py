@@ -117,7 +117,7 @@ def prepare(pair, resolution):
 
 def without_coupling(mesh):
     """The mesh with the compliance between different pairs taken out."""
-    own = jnp.eye(mesh.structure.shape[0])[:, :, None] * mesh.structure
+    own = jnp.eye(mesh.structure.shape[0])[:, :, None, None] * mesh.structure
     return eqx.tree_at(lambda m: m.structure, mesh, own)
 
 

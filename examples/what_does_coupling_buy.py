@@ -40,7 +40,7 @@ def prepare(pair, compliance, resolution):
 
 def uncouple(mesh):
     """The mesh with every pair deaf to the others."""
-    own = jnp.eye(mesh.resolution.pairs)[:, :, None]
+    own = jnp.eye(mesh.resolution.pairs)[:, :, None, None]
     return eqx.tree_at(lambda m: m.structure, mesh, mesh.structure * own)
 
 

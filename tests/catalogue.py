@@ -192,7 +192,7 @@ def high_contact_ratio_pair() -> jg.GearPair:
 def constant_stiffness_mesh(pair: jg.GearPair, stiffness: float, resolution: jg.Resolution) -> jg.Mesh:
     """A mesh of uncoupled tooth pairs, all of one stiffness [N/um] on the path of contact, and apart outside."""
     mesh = prepare(pair, resolution=resolution)
-    per_width = jnp.full_like(mesh.path, pair.face_width / stiffness)[:, None]
+    per_width = jnp.full_like(mesh.path, pair.face_width / stiffness)
     return eqx.tree_at(
         lambda m: (m.structure, m.law, m.corner_gap, m.lever, m.hub),
         mesh,

@@ -60,13 +60,13 @@ def coupled(problem, coupling, **given) -> ContactProblem:
     return replace(problem, compliance=coupling.local(len(problem.gap)), coupling=coupling, **given)
 
 
-def influence(coupling, weight=1.0):
+def influence(coupling, weight):
     """Deflection of every slice of every pair under the line load of every other one, without a support: the whole
-    matrix in NumPy, shape (pairs, slices, pairs, slices, positions).
+    matrix in NumPy, shape (pairs, slices, pairs, slices, positions); `weight` are the widths of the slices.
     """
     modes, found = np.asarray(coupling.modes), 0.0
     for compliance, share, rest in coupling.bodies:
-        face = float(rest) * np.eye(len(modes)) + modes @ np.asarray(share) @ modes.T * weight
+        face = float(rest) * np.eye(len(modes)) + modes @ np.asarray(share) @ modes.T * np.asarray(weight)
         found = found + np.einsum("ijx,st->isjtx", compliance, face)
     if coupling.scale is not None:
         found = np.einsum("isx,isjtx,jtx->isjtx", coupling.scale, found, coupling.scale)

@@ -36,7 +36,7 @@ LEAVES = (
 def direction(k, leaf):
     """Fixed direction, of the size of the leaf, in which the k-th component of x moves it."""
     d = np.random.default_rng(k).uniform(0.2, 1.0, leaf.shape) * np.mean(np.abs(leaf))
-    return jnp.asarray(d + d.swapaxes(0, 1) if leaf.ndim == 3 and leaf.shape[0] == leaf.shape[1] else d)
+    return jnp.asarray(d + d.swapaxes(0, 1) if leaf.ndim == 4 else d)
 
 
 def value(x):

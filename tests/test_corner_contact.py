@@ -160,7 +160,7 @@ def test_mesh_continues_beyond_the_path_with_continuous_slope(fine):
 def test_lever_is_one_minus_half_the_slope_of_the_gap(fine):
     """Energy: under a transmission error d both gears turn by d/2, so the gap changes by its slope times d/2."""
     mesh = fine
-    gap, lever, path = (np.asarray(a)[0] for a in (mesh.corner_gap, mesh.lever, mesh.path))
+    gap, lever, path = (np.asarray(a)[0, 0] for a in (mesh.corner_gap, mesh.lever, mesh.path))
     end, pitch = float(mesh.path_of_contact.end), float(mesh.path_of_contact.base_pitch)
     after = (path > end) & (path < end + 0.35 * pitch)  # farther out the gap goes on along its tangent
     slope = np.gradient(gap[after], path[after])
@@ -224,7 +224,7 @@ def test_corner_contact_is_softer_than_the_flank_and_regular(fine):
     law, flank = mesh.law, mesh.law.flank
 
     def both(q):
-        whole = jnp.full(mesh.path.shape, q)[:, None]
+        whole = jnp.full(mesh.path.shape, q)
         ones = jnp.ones_like(whole)
         return *jax.jvp(law.deflection, (whole,), (ones,)), flank.deflection(whole)
 
@@ -232,7 +232,7 @@ def test_corner_contact_is_softer_than_the_flank_and_regular(fine):
     assert np.isfinite(slope).all() and (slope > 0).all()
     assert (deflection >= uncut * (1 - 1e-12)).all()
     middle = np.abs(mesh.path) < 0.1 * float(mesh.path_of_contact.base_pitch)
-    ratio = (deflection / np.where(uncut > 0, uncut, 1.0))[:, middle[:, None]]
+    ratio = (deflection / np.where(uncut > 0, uncut, 1.0))[:, middle]
     assert ratio[1:].max() < 1.02, "far from the corners nothing changes"
 
 

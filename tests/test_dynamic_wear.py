@@ -121,7 +121,7 @@ def test_the_worn_volume_is_that_of_the_forces_of_the_motion(mesh, natural):
     assert motion.status == 0 and motion.force.shape == (12, 64) and (force >= 0).all()
     contact = solve_forces(mesh, jnp.asarray(force), removed_material(mesh, TORQUE, **FLANKS))
     carried = np.asarray(contact.line_load)[:, 0] * float(mesh.slice_width[0])
-    np.testing.assert_allclose((carried * np.asarray(mesh.lever)).sum(axis=0), force, rtol=1e-10)
+    np.testing.assert_allclose((carried * np.asarray(mesh.lever)[:, 0]).sum(axis=0), force, rtol=1e-10)
     sliding = np.einsum("ij,pij->p", carried, np.asarray(place.sliding).sum(axis=-1)[:, :, 0])
     passages = 1e-3 * np.array([1.0, TEETH[0] / TEETH[1]])
     np.testing.assert_allclose(worn_volume(short)[-1], 1e6 * COEFFICIENT * passages[:, None] * sliding, rtol=1e-9)
@@ -139,7 +139,7 @@ def test_a_force_is_carried_as_its_torque_is(mesh, resonant):
         contact = solve_forces(mesh, jnp.asarray(full * share), removed)
         loads.append(np.asarray(contact.line_load)[:, 0])
         assert np.asarray(contact.converged).all()
-        carried = loads[-1] * float(mesh.slice_width[0]) * np.asarray(mesh.lever)
+        carried = loads[-1] * float(mesh.slice_width[0]) * np.asarray(mesh.lever)[:, 0]
         np.testing.assert_allclose(carried.sum(axis=0), full * share, rtol=1e-10)
     static = np.asarray(resonant.cycles.line_load)[0, :, 0]  # of the new flanks
     np.testing.assert_allclose(np.where(shares[0] == 1, *loads), static, rtol=1e-8, atol=1e-8)
@@ -166,7 +166,7 @@ def test_wear_is_deeper_where_the_force_of_the_motion_peaks(mesh, natural):
     factor = np.asarray(motion_at(mesh, natural)[1].force[0, OF_MESH]) / static_force(mesh)
     carried = np.asarray(static.cycles.pair_force[0])
     peak = np.argmax(np.where((carried > 0).sum(axis=0) == 1, factor, 0.0))
-    roll = float(mesh.sides[0].contact_roll_length[carried[:, peak].argmax(), peak])
+    roll = float(mesh.sides[0].contact_roll_length[carried[:, peak].argmax(), 0, peak])
     depths = [np.interp(roll, life.roll_length[0], life.pinion_depth[-1, 0]) for life in (dynamic, static)]
     assert factor[peak] > 1.2
     assert depths[0] / depths[1] == pytest.approx(factor[peak], rel=0.1)

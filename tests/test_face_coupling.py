@@ -138,11 +138,11 @@ def coupled_problem(seed, springs, slices, count, bends=0):
     if bends:
         root = rng.normal(size=(bends, bends))
         shapes, held = np.linalg.qr(np.vander(np.linspace(-1, 1, slices), bends, increasing=True))[0], root @ root.T
-        shapes[:, 0], held = slices**-0.5, jnp.asarray(0.01 * held)
+        shapes[:, 0], held = slices**-0.5, jnp.asarray(0.01 * slices / WIDTH * held)
         shapes = jnp.asarray(shapes)
     problem = random_problem(seed, springs, slices, 6)
-    modes, *spread = modes_of(kernel(slices), count)
-    bodies = (Body(problem.compliance[:, :, 0], *spread),)
+    modes, share, rest = modes_of(kernel(slices), count)
+    bodies = (Body(problem.compliance[:, :, 0], share * slices / WIDTH, rest),)
     coupling = SliceCoupling(modes, bodies, support_modes=shapes, support=held)
     return coupled(problem, coupling, weight=jnp.full(slices, WIDTH / slices), load=jnp.asarray(2000.0))
 
@@ -150,9 +150,9 @@ def coupled_problem(seed, springs, slices, count, bends=0):
 def dense(problem):
     """Influence of every load on every deflection, shape (positions, springs, slices, springs, slices)."""
     c = problem.coupling
-    found = np.moveaxis(influence(c), -1, 0)
+    found = np.moveaxis(influence(c, problem.weight), -1, 0)
     if c.support is not None:
-        held = c.support_modes @ c.support @ c.support_modes.T
+        held = c.support_modes @ c.support @ c.support_modes.T * problem.weight[None]
         found = found + np.einsum("ix,jx,st->xisjt", problem.lever[:, 0], problem.lever[:, 0], held)
     return found
 
@@ -188,7 +188,7 @@ def test_solution_meets_the_conditions_of_the_dense_problem(mesh, on_table, held
         prepared.own_structure,
         prepared.law,
         prepared.held(found.gap),
-        prepared.lever[:, None],
+        prepared.lever,
         prepared.slice_width,
         found.force,
         coupling=prepared.coupling,
@@ -270,7 +270,7 @@ def test_misalignment_is_a_slope_of_the_flank_and_no_support_is_none(mesh, slope
     rigid = mesh_of(RigidSupport(mesh.pair, Misalignment(direct=20.0)))
     found = jg.solve(rigid, TORQUE)
     opened = 20.0 * np.asarray(mesh.face_coordinate)[:, None] / WIDTH
-    same = jg.contact.solve_removed(mesh, TORQUE, np.asarray(mesh.lever)[:, None] * opened[None])
+    same = jg.contact.solve_removed(mesh, TORQUE, np.asarray(mesh.lever) * opened[None])
     np.testing.assert_allclose(found.line_load, same.line_load, rtol=1e-8, atol=1e-8)
     np.testing.assert_allclose(found.transmission_error, same.transmission_error, rtol=1e-10)
     np.testing.assert_allclose(found.transmission_error, sloped.transmission_error, rtol=1e-3)
@@ -293,12 +293,12 @@ def test_support_is_that_of_the_dense_matrix(mesh, on_table):
     given = on_table.support
     found = jg.solve(on_table, TORQUE, pinion=SLOPE)
     force = np.asarray(found.line_load) * np.asarray(mesh.slice_width)[None, :, None]
-    bent = np.einsum("st,ix,itx->sx", given.matrix, mesh.lever, force)
+    bent = np.einsum("st,ix,itx->sx", given.matrix, mesh.lever[:, 0], force)
     removed = jg.contact.removed_material(mesh, TORQUE, pinion=SLOPE).amount
     # what the support has opened, taken as material removed of gears on rigid shafts
     lever = np.asarray(mesh.lever)
     own = bent + np.asarray(given.opening)[:, None]
-    opened = removed + lever[:, None] * own[None]
+    opened = removed + lever * own[None]
     again = jg.contact.solve_removed(mesh, TORQUE, opened)
     np.testing.assert_allclose(again.transmission_error, found.transmission_error, rtol=1e-8)
     np.testing.assert_allclose(again.line_load, found.line_load, rtol=1e-6, atol=1e-6)

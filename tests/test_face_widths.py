@@ -142,7 +142,7 @@ def test_equal_faces_are_the_limit():
     assert len(bodies[1]) == 2 * len(bodies[0]) and one.keys() - bodies[0] == both.keys() - bodies[1]
     for name in one.keys() - bodies[0]:
         np.testing.assert_allclose(both[name], one[name], rtol=1e-10, atol=1e-14, err_msg=name)
-    of_one, of_both = (influence(each.coupling) for each in (mesh, overhanging(pair_of())))
+    of_one, of_both = (influence(each.coupling, mesh.slice_width) for each in (mesh, overhanging(pair_of())))
     np.testing.assert_allclose(of_both, of_one, rtol=1e-10, atol=1e-14)
     limit = mesh_of(pair_of(18.0 + 1e-9))
     assert mesh.even and not limit.even

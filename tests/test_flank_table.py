@@ -28,7 +28,7 @@ def contact_field(mesh, gear, rate=RATE):
     """Linear over roll length and face, constant of one um at the pitch point in the middle of the face."""
     side = side_of(mesh, gear)
     along = side.contact_roll_length - side.pitch_roll_length
-    return 1.0 + rate[0] * along[:, None] + rate[1] * mesh.face_coordinate[None, :, None]
+    return 1.0 + rate[0] * along + rate[1] * mesh.face_coordinate[None, :, None]
 
 
 table_of = eqx.filter_jit(flank_table)
@@ -40,7 +40,7 @@ def taken(table, flank):
 
 
 def on_path(mesh):
-    return np.broadcast_to(np.asarray(mesh.outside <= 0)[:, None], (2, 3, 16))
+    return np.broadcast_to(np.asarray(mesh.outside <= 0), (2, 3, 16))
 
 
 @GEARS
@@ -76,7 +76,7 @@ def test_the_table_removes_what_the_field_says(mesh, gear):
     step = float(mesh.path_of_contact.base_pitch) / 16
     path, contact = np.asarray(mesh.path), mesh.path_of_contact
     inner = (path > float(contact.start) + step) & (path < float(contact.end) - step)
-    inner = np.broadcast_to(inner[:, None], removed.shape)
+    inner = np.broadcast_to(inner, removed.shape)
     np.testing.assert_allclose(np.asarray(removed)[inner], np.asarray(field)[inner], atol=2e-3)
     constant = table_of(mesh.kinematics, np.full((2, 3, 16), 4.0), gear)
     np.testing.assert_allclose(removed_material(mesh, 50.0, **{gear: constant}).amount, 4.0, rtol=1e-13)

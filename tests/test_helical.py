@@ -98,7 +98,7 @@ def test_an_angle_of_zero_is_a_spur_gear():
 def test_a_small_angle_goes_to_the_spur_gear():
     """Nothing jumps where contact lines begin to run across the face, the largest pressure included."""
     mesh, spur = solved(None)
-    assert mesh.kinematics.contact_path.shape == (3, 8) and not mesh.kinematics.helical
+    assert mesh.kinematics.path.shape == (3, 1, 8) and not mesh.kinematics.helical
     _, nearly = solved(1e-6)
     np.testing.assert_allclose(nearly.transmission_error, spur.transmission_error, atol=1e-9)
     np.testing.assert_allclose(nearly.line_load, spur.line_load, atol=2e-4)
@@ -120,13 +120,13 @@ def test_the_other_hand_is_the_mirrored_face():
 
 def test_solution_meets_the_conditions():
     mesh, cycle = solved()
-    assert bool(cycle.converged.all()) and mesh.kinematics.contact_path.shape == (3, 5, 8)
+    assert bool(cycle.converged.all()) and mesh.kinematics.path.shape == (3, 5, 8)
     np.testing.assert_allclose(cycle.pair_force.sum(axis=0), cycle.force, rtol=1e-10)
     load = np.asarray(cycle.line_load)
-    deflected = np.einsum("psjtn,jtn->psn", influence(mesh.coupling), load)
+    deflected = np.einsum("psjtn,jtn->psn", influence(mesh.coupling, mesh.slice_width), load)
     approach = np.asarray(cycle.transmission_error) - float(mesh.hub * cycle.force / mesh.pair.face_width)
     law = np.asarray(mesh.law.deflection(jnp.asarray(load)))
-    force = np.asarray(mesh.lever * load).sum(axis=0)
+    force = np.sum(np.asarray(mesh.lever) * load * np.asarray(mesh.slice_width)[:, None], axis=0)
     bends, tilt = np.asarray(mesh.coupling.support_modes), np.asarray(mesh.coupling.support)
     tilted = bends @ tilt @ bends.T @ force
     assert np.abs(tilted).max() > 1e-3 and bends.shape == (5, 2)  # um
@@ -149,7 +149,7 @@ def test_two_pairs_in_every_slice_are_all_that_touch():
 def test_flanks_that_reach_farther_than_two_pairs_are_told():
     pair, (mesh, cycle) = pair_of(), solved()
     assert pairs_alternate(pair, SIZES, None) and not pairs_alternate(pair, replace(SIZES, pairs=4), None)
-    far = np.abs(mesh.kinematics.contact_path) > float(mesh.pair.base_pitch)
+    far = np.abs(mesh.kinematics.path) > float(mesh.pair.base_pitch)
     assert 0 < far.sum() and np.asarray(cycle.opening)[far].min() > 100.0
     at = np.arange(8) == 4
     removed = jg.contact.removed_material(mesh, TORQUE, **flanks()) + jnp.where(far & at, -3000.0, 0.0)
@@ -160,7 +160,7 @@ def test_flanks_that_reach_farther_than_two_pairs_are_told():
 
 def test_slices_far_along_the_path_touch_later():
     mesh, cycle = solved()
-    path, load = np.asarray(mesh.kinematics.contact_path), np.asarray(cycle.line_load)
+    path, load = np.asarray(mesh.kinematics.path), np.asarray(cycle.line_load)
     ahead = float(mesh.slice_width[0] * jnp.tan(mesh.pair.pinion.base_helix_angle))
     np.testing.assert_allclose(np.diff(path, axis=1), ahead, rtol=1e-12)  # a right hand: the positive end comes first
     start = float(mesh.path_of_contact.start)
@@ -188,7 +188,7 @@ def test_harmonics_of_a_constant_stiffness(width, beta):
     """2 |sinc(n eps_alpha) sinc(n eps_beta)| of the mean; slices that are whole or apart leave about 1 / slices."""
     sizes = replace(SIZES, positions=64, slices=81, coupled_slices=False, slide_steps=0, extended_contact=False)
     mesh = jg.prepare(pair_of(beta, width), resolution=sizes)
-    outside = mesh.kinematics.contact_outside > 0
+    outside = mesh.kinematics.outside > 0
     plain = eqx.tree_at(
         lambda m: (m.structure, m.law, m.corner_gap, m.lever),
         mesh,
@@ -271,8 +271,7 @@ def test_gears_must_have_opposite_hands():
 
 
 REFUSED = {
-    "path": lambda: solved()[0].path,
-    "outside": lambda: solved()[1].kinematics.outside,
+    "flank table": lambda: jg.contact.flank_table(solved()[1].kinematics, solved()[1].line_load, "pinion"),
     "finite elements": lambda: finite_element_compliance(pair_of(None)).check(pair_of()),
     "form wheel": lambda: manufacture.wheel_profile(solved()[0].sides[0], jg.TipRelief(5.0, 2.0)),
 }

@@ -88,7 +88,7 @@ def test_coast_flanks_touch_where_both_gears_turned_back_put_them():
 
     lengths = contact.pinion_roll_length, contact.wheel_roll_length
     for gear, length, sign in zip(pair.gears, lengths, (1, -1)):
-        paths = mesh.kinematics.contact_path[1], coast.mesh.kinematics.contact_path[1][:, coast.order]
+        paths = mesh.kinematics.path[1], coast.mesh.kinematics.path[1][:, coast.order]
         there, behind = (centreline(gear, sign, length(path)) for path in paths)
         turned = there - sign * 0.5 * play / gear.base_radius + behind
         pitches = np.asarray(turned * gear.teeth / (2 * jnp.pi))
@@ -116,10 +116,10 @@ def test_deviations_keep_their_place_on_the_flank():
     mesh = mesh_of()
     finer = half_way(mesh)
     rates = jnp.arange(1.0, 6.0)[None, :, None]
-    given = rates * mesh.kinematics.contact_path + rates**2
-    wanted = rates * finer.kinematics.contact_path + rates**2
+    given = rates * mesh.kinematics.path + rates**2
+    wanted = rates * finer.kinematics.path + rates**2
     found = np.asarray(interpolated(given, mesh, finer))
-    inside = np.asarray(finer.kinematics.contact_path < mesh.kinematics.contact_path.max(axis=(0, 2), keepdims=True))
+    inside = np.asarray(finer.kinematics.path < mesh.kinematics.path.max(axis=(0, 2), keepdims=True))
     assert (~inside).sum() <= 5
     np.testing.assert_allclose(found[inside], np.asarray(wanted)[inside], rtol=1e-12)
 

@@ -209,7 +209,7 @@ def test_losses_of_a_constant_line_load():
     pair = pair_of(15.0, np.pi * 3.0 / np.sin(np.deg2rad(15.0)))
     assert float(pair.overlap_ratio) == pytest.approx(1.0, rel=1e-12)
     moving = kinematics(pair, jnp.zeros(()), replace(SIZES, positions=64, slices=41, pairs=4), "strain")
-    load = jnp.where(moving.contact_outside <= 0, 1.0, 0.0)
+    load = jnp.where(moving.outside <= 0, 1.0, 0.0)
     forces = jnp.einsum("psn,s->pn", load, moving.slice_width)
     force = float(jnp.mean(jnp.sum(forces, axis=0)))
     point = OperatingPoint(1e-3 * force * pair.pinion.base_radius)
@@ -232,9 +232,9 @@ def test_lubrication_by_the_transverse_path_and_the_normal_radius():
     """Flash temperature, film and friction of single contacts by hand."""
     cycle = running()
     of, path = cycle.kinematics, cycle.kinematics.path_of_contact
-    inside = (np.asarray(of.contact_outside) <= 0) & (np.asarray(cycle.line_load) > 0)
+    inside = (np.asarray(of.outside) <= 0) & (np.asarray(cycle.line_load) > 0)
     where = tuple(np.argwhere(inside)[7])
-    x, load = float(of.contact_path[where]), float(cycle.line_load[where])
+    x, load = float(of.path[where]), float(cycle.line_load[where])
     omega, beta_b = SPEED * np.pi / 30, float(of.pair.pinion.base_helix_angle)
     r1, r2 = float(path.pinion_roll_length(x)), float(path.wheel_roll_length(x))
     v1, v2 = 1e-3 * omega * r1, 1e-3 * omega * 19 / 48 * r2

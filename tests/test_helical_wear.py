@@ -31,7 +31,7 @@ def slid(mesh):
     """Sliding of every position of every slice on the path of contact [mm], in the transverse section."""
     contact = mesh.path_of_contact
     half = 0.5 * float(contact.base_pitch) / mesh.resolution.positions * np.array([-1, 1])
-    ends = np.asarray(mesh.kinematics.contact_path)[..., None] + half
+    ends = np.asarray(mesh.kinematics.path)[..., None] + half
     ends = np.clip(ends, float(contact.start), float(contact.end))
     inverse = 1 / float(contact.pinion_base_radius) + 1 / float(contact.wheel_base_radius)
     return np.diff(0.5 * ends * np.abs(ends), axis=-1)[..., 0] * inverse
@@ -47,7 +47,7 @@ def test_every_slice_slides_over_the_whole_path_of_contact(mesh, place):
 
 def test_an_even_load_wears_all_slices_by_the_formula(mesh, place):
     """k w |u1 - u2| / u normal to the flank, and as a modification over cos(beta_b), whatever the phase of a slice."""
-    load = jnp.full(mesh.kinematics.contact_path.shape, 100.0)
+    load = jnp.full(mesh.kinematics.path.shape, 100.0)
     depth = np.asarray(worn(load, jnp.zeros_like(load), jnp.full((2, 1, 1, 1), COEFFICIENT), place))[:, 0]
     contact, length = mesh.path_of_contact, np.asarray(place.roll_length)
     at = length[0] - float(contact.pinion_pitch_roll_length), float(contact.wheel_pitch_roll_length) - length[1]

@@ -108,7 +108,7 @@ def with_slope(mesh):
 
 def pitch_pair(cycle):
     """Number of the pair that touches at the pitch point at position 0."""
-    return int(np.argmin(np.abs(np.asarray(cycle.kinematics.path)[:, PITCH])))
+    return int(np.argmin(np.abs(np.asarray(cycle.kinematics.path)[:, 0, PITCH])))
 
 
 # oil
@@ -205,7 +205,7 @@ def test_a_coefficient_of_the_load_takes_the_place_of_the_law(solve):
 def test_power_loss_is_friction_force_times_sliding(solve):
     given = solve(TORQUE, SPEED, 0.07)
     kinematics = given.kinematics
-    sliding = np.abs(np.asarray(kinematics.path_of_contact.sliding_speed(kinematics.path, SPEED)))
+    sliding = np.abs(np.asarray(kinematics.path_of_contact.sliding_speed(kinematics.path[:, 0], SPEED)))
     watt = (0.07 * np.asarray(given.pair_force) * sliding).sum(0).mean()
     assert float(metrics.loss_power(given)) == pytest.approx(watt, rel=1e-12) and watt > 100
     efficiency = 1 - watt / (TORQUE * SPEED * np.pi / 30)
@@ -225,7 +225,7 @@ def test_at_the_pitch_point_the_contact_is_as_hot_as_the_teeth(cycle):
 
 
 def test_bulk_temperature_rises_with_the_mean_of_flash_or_with_the_loss(cycle):
-    inside = np.asarray(cycle.kinematics.outside) <= 0
+    inside = np.asarray(cycle.kinematics.outside)[:, 0] <= 0
     flash = np.asarray(metrics.lubricated_flash_temperature(cycle, OIL))[:, 0]
     rise = 0.47 * flash[inside].mean()
     # 23 of the places on the path are at positions; the path is 23.4 steps long

@@ -165,9 +165,9 @@ def test_pressure_of_a_tip_edge_is_hertz_with_that_edge_and_the_flank_of_its_mat
     """Before the path the wheel's tip touches the pinion's flank, behind it the pinion's tip the wheel's."""
     gears = {name: dataclasses.replace(getattr(mesh.pair, name), tip_edge_radius=edge) for name, edge in EDGES.items()}
     kinematics = dataclasses.replace(mesh.kinematics, pair=dataclasses.replace(mesh.pair, **gears))
-    path, contact = np.asarray(kinematics.path), kinematics.path_of_contact
+    path, contact = np.asarray(kinematics.path)[:, 0], kinematics.path_of_contact
     pressure = np.asarray(corner_pressure(kinematics, jnp.full((*path.shape[:1], 1, path.shape[1]), 100.0)))[:, 0]
-    flanks = [np.asarray(side.contact_roll_length) for side in kinematics.sides]
+    flanks = [np.asarray(side.contact_roll_length)[:, 0] for side in kinematics.sides]
     before, behind = path < float(contact.start), path > float(contact.end)
     assert before.any() and behind.any() and not pressure[~before & ~behind].any()
     for there, edge, mate in ((before, EDGES["wheel"], flanks[0]), (behind, EDGES["pinion"], flanks[1])):
@@ -203,7 +203,9 @@ def test_flash_temperature_is_that_of_blok_on_steel(cycle, speed):
     there = np.asarray(cycle.contact_pressure)[:, 0] > 0
     load, pressure = (np.asarray(of)[:, 0][there] for of in (1e3 * cycle.line_load, 1e6 * cycle.contact_pressure))
     turning = speed * 2 * np.pi / 60 * np.array([1.0, 19 / 48])
-    first, second = (1e-3 * np.asarray(of.contact_roll_length)[there] * rate for of, rate in zip(cycle.sides, turning))
+    first, second = (
+        1e-3 * np.asarray(of.contact_roll_length)[:, 0][there] * rate for of, rate in zip(cycle.sides, turning)
+    )
     heat = 0.05 * load * np.abs(first - second)
     sink = 13_800.0 * (np.sqrt(first) + np.sqrt(second)) * np.sqrt(2 * 2 * load / (np.pi * pressure))
     rise = np.asarray(jg.metrics.flash_temperature(cycle, speed, friction=0.05))[:, 0]

@@ -43,7 +43,7 @@ def test_misalignment_is_the_lead_slope_of_its_amount(pair, sloped):
     np.testing.assert_allclose(gaps[1], gaps[0], rtol=1e-12, atol=1e-12)
     assert np.ptp(gaps[0]) == pytest.approx(AMOUNT * 5 / 6)  # between the middles of six slices
     found = jg.solve(mesh, 50.0, pinion=RELIEF + jg.LeadSlope(0.0), wheel=RELIEF)
-    inside = np.broadcast_to(np.asarray(mesh.outside == 0)[:, None], found.gap.shape)
+    inside = np.broadcast_to(np.asarray(mesh.outside == 0), found.gap.shape)
     np.testing.assert_allclose(mesh.held(found.gap)[inside], sloped.gap[inside], rtol=1e-12, atol=1e-12)
     # two programs, each solved to 1e-11
     np.testing.assert_allclose(found.transmission_error, sloped.transmission_error, rtol=1e-11)

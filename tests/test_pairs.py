@@ -32,7 +32,7 @@ def test_two_pairs_are_enough_for_19_48(mesh):
 
 def test_traced_gears_take_four():
     shape = jax.eval_shape(lambda width: jg.prepare(gear_pair(face_width=width), resolution=SIZE), 18.0)
-    assert shape.structure.shape == (4, 4, 16)
+    assert shape.structure.shape == (4, 4, 1, 16)
 
 
 def test_what_the_pairs_have_to_contain_can_be_said():
@@ -114,7 +114,7 @@ def expected_between(mesh, removed):
 @jax.jit
 def expected_too_high(mesh, wide, removed):
     """By how much more than expected the gaps of these pairs close at most."""
-    closing = (wide.corner_gap[None, :, None] + removed.amount) / wide.lever[None, :, None]
+    closing = (wide.corner_gap[None] + removed.amount) / wide.lever[None]
     true = jnp.minimum(closing[:, 0], closing[:, 3]).min(axis=1)
     return (expected_between(mesh, removed) - true).max()
 

@@ -239,7 +239,7 @@ def test_plane_of_action_carries_the_whole_force(cycles, mesh):
     ax = plot.plane_of_action(cycles["unmodified"])
     drawn = np.nan_to_num(np.ma.filled(ax.collections[0].get_array(), 0.0))
     stages = drawn.reshape(mesh.resolution.slices, mesh.resolution.pairs, -1)
-    lever = np.asarray(mesh.lever)[::-1]  # the last pair comes first
+    lever = np.asarray(mesh.lever)[::-1, 0]  # the last pair comes first
     carried = np.einsum("spn,pn,s->n", stages, lever, np.asarray(mesh.slice_width))
     np.testing.assert_allclose(carried, float(cycles["unmodified"].force), rtol=1e-9)
     corner = ax.collections[0].get_coordinates()[0, :-1, 0] < float(mesh.path_of_contact.start)

@@ -108,7 +108,7 @@ def test_random_approaches_satisfy_all_conditions(law):
     q = np.asarray(solution.line_load)
     deflection = np.asarray(jax.vmap(lambda law, row: law.deflection(row))(data.law, solution.line_load))
     distance = np.einsum("ijn,jsn->isn", data.compliance[:, :, 0], q) + deflection + np.asarray(data.gap)
-    distance -= np.asarray(data.lever * approach)
+    distance -= np.asarray(data.lever) * np.asarray(approach)
     tolerance = 1e-10 * np.asarray(approach)[None, None]
     assert q.min() >= 0 and np.all(q.sum(axis=(0, 1)) > 0)
     assert np.all(distance > -tolerance)

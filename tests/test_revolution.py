@@ -110,7 +110,7 @@ def test_flanks_of_single_teeth_are_those_of_whole_gears_in_their_rows():
         removed_material(mesh(), TORQUE, pinion=RELIEF, wheel=RELIEF + jg.ProfileSlope(slopes[tooth])).amount[row]
         for row, tooth in enumerate((7, 8))
     ]
-    gap = found.cycles.gap[7] - mesh().corner_gap[:, None]
+    gap = found.cycles.gap[7] - mesh().corner_gap
     np.testing.assert_allclose(gap, np.stack(rows), atol=1e-10)
 
 

@@ -133,11 +133,11 @@ def coupled_problem(bends):
     shapes = held = None
     if bends:
         made = rng.normal(size=(bends, bends))
-        held = jnp.asarray(0.01 * made @ made.T)
+        held = jnp.asarray(0.01 / 3.0 * made @ made.T)
         powers = np.linalg.qr(root * np.vander(np.linspace(-1, 1, 6), bends, increasing=True))[0] / root
         shapes = jnp.asarray(powers * np.sign(powers[0, 0]))
     problem = random_problem(3, 2, 6, 6)
-    bodies = (Body(problem.compliance[:, :, 0], jnp.asarray(share), jnp.asarray(rest)),)
+    bodies = (Body(problem.compliance[:, :, 0], jnp.asarray(share) / 3.0, jnp.asarray(rest)),)
     coupling = SliceCoupling(jnp.asarray(modes / root), bodies, support_modes=shapes, support=held)
     return coupled(problem, coupling, weight=jnp.asarray(3.0 * WEIGHT), load=jnp.asarray(2000.0))
 
@@ -145,9 +145,9 @@ def coupled_problem(bends):
 def assert_conditions(c, gap, lever, approach, load, own, opening):
     """Deflections by the whole matrix in NumPy: no overlap, no pull, closed where loaded."""
     load, lever, approach = (np.asarray(each) for each in (load, lever, approach))
-    left = np.einsum("isjtx,jtx->isx", influence(c, WEIGHT), load)
+    left = np.einsum("isjtx,jtx->isx", influence(c, 3.0 * WEIGHT), load)
     if c.support is not None:
-        way = c.support_modes @ c.support @ c.support_modes.T @ np.diag(WEIGHT)
+        way = c.support_modes @ c.support @ c.support_modes.T @ np.diag(3.0 * WEIGHT)
         left = left + np.einsum("ix,jx,st,jtx->isx", lever, lever, way, load)
     left = left + np.asarray(gap) - (lever * approach)[:, None]
     total, scale = left + np.asarray(own) * load, 1e-9 * np.abs(approach).max()
@@ -169,9 +169,9 @@ def test_solution_meets_the_conditions_of_the_dense_problem():
     assert bool(found.converged.all())
     approach = found.transmission_error - mesh.hub * found.force / mesh.pair.face_width
     own = own_deflection(mesh.law, found.line_load)
-    given = mesh.coupling, mesh.held(found.gap), mesh.lever
+    given = mesh.coupling, mesh.held(found.gap), mesh.lever[:, 0]
     assert_conditions(*given, approach, found.line_load, own, found.opening)
-    carried = np.einsum("ix,s,isx->x", mesh.lever, mesh.slice_width, found.line_load)
+    carried = np.einsum("ix,s,isx->x", mesh.lever[:, 0], mesh.slice_width, found.line_load)
     np.testing.assert_allclose(carried, float(found.force), rtol=1e-10)
 
 
@@ -247,7 +247,7 @@ def test_mirrored_slices_and_misalignment_mirror_the_load(mesh, coupled):
     assert bool(here.converged.all()) and float(face_load_factor(here)) > 1.5
     np.testing.assert_allclose(there.line_load, np.asarray(here.line_load)[:, ::-1], rtol=1e-8, atol=1e-8)
     np.testing.assert_allclose(there.transmission_error, here.transmission_error, rtol=1e-10)
-    force = np.einsum("psx,s,px->x", here.line_load, one.slice_width, one.lever)
+    force = np.einsum("psx,s,px->x", here.line_load, one.slice_width, one.lever[:, 0])
     np.testing.assert_allclose(force, here.force, rtol=1e-10)
 
 
@@ -279,9 +279,9 @@ def test_support_gives_way_under_the_forces_of_the_slices():
     """A parabola over the face, which three polynomials hold exactly."""
     given = Bent(pair_of(), Misalignment(direct=20.0))
     mesh, load = mesh_of(support=given), np.random.default_rng(0).uniform(size=(2, 6, 4))
-    force = np.sum(np.asarray(mesh.lever)[:, None] * load, axis=0) * np.asarray(mesh.slice_width)[:, None]
-    under = jax.jit(lambda held, lever, load: held.support_deflection(WEIGHT, lever, list(load)))
-    bent = under(mesh.coupling, mesh.lever[:, None], load)
+    force = np.sum(np.asarray(mesh.lever) * load, axis=0) * np.asarray(mesh.slice_width)[:, None]
+    under = jax.jit(lambda held, lever, load: held.support_deflection(mesh.slice_width, lever, list(load)))
+    bent = under(mesh.coupling, mesh.lever, load)
     np.testing.assert_allclose(bent, given.influence(np.asarray(mesh.face_coordinate)) @ force, rtol=1e-12)
     np.testing.assert_allclose(mesh.support_gap, 20.0 / WIDTH * np.asarray(mesh.face_coordinate), rtol=1e-12)
 

@@ -33,12 +33,12 @@ def sliced(mesh):
 
 
 def radius(mesh):
-    return np.asarray(reduced_radius(*(side.contact_roll_length for side in mesh.sides)))
+    return np.asarray(reduced_radius(*(side.contact_roll_length for side in mesh.sides)))[:, 0]
 
 
 def inner(mesh, distance=0.6):
     """Contacts on the path and farther than a distance [mm] from its ends."""
-    path, contact = np.asarray(mesh.path), mesh.path_of_contact
+    path, contact = np.asarray(mesh.path)[:, 0], mesh.path_of_contact
     return (path > float(contact.start) + distance) & (path < float(contact.end) - distance)
 
 
@@ -83,7 +83,7 @@ def usual_share(mesh):
     """A third of the load at the ends of the path, all of it where a pair is alone, and linear between."""
     contact, pitch = mesh.path_of_contact, mesh.pair.base_pitch
     at = jnp.stack([contact.start, contact.end - pitch, contact.start + pitch, contact.end])
-    return jnp.interp(mesh.path, at, jnp.asarray([1 / 3, 1.0, 1.0, 1 / 3]))
+    return jnp.interp(mesh.path[:, 0], at, jnp.asarray([1 / 3, 1.0, 1.0, 1 / 3]))
 
 
 def search(mesh, pinion, wheel):
@@ -96,9 +96,10 @@ def _least(mesh, gap, pinion, wheel, nodes=12):
     angle = np.pi * np.arange(1, nodes + 1) / (nodes + 1)
     weights = np.sin(angle) ** 2 / np.sum(np.sin(angle) ** 2)
     force = 1e3 * TORQUE / mesh.pair.pinion.base_radius * usual_share(mesh)
-    half = jnp.sqrt(mesh.width_factor * force / mesh.pair.face_width)
-    inside = [(side.tip_roll_length**2 - side.contact_roll_length**2) / (2 * side.base_radius) for side in mesh.sides]
-    outside, path, contact = mesh.outside, mesh.path, mesh.path_of_contact
+    half = jnp.sqrt(mesh.width_factor[:, 0] * force / mesh.pair.face_width)
+    rolls = [side.contact_roll_length[:, 0] for side in mesh.sides]
+    inside = [(side.tip_roll_length**2 - at**2) / (2 * side.base_radius) for side, at in zip(mesh.sides, rolls)]
+    outside, path, contact = mesh.outside[:, 0], mesh.path[:, 0], mesh.path_of_contact
     beyond = [(2 * side.tip_roll_length + outside) * outside / (2 * side.base_radius) for side in mesh.sides]
     centre = jnp.where(path > contact.end, beyond[0], 0.0) - jnp.where(path < contact.start, beyond[1], 0.0)
 
@@ -107,7 +108,7 @@ def _least(mesh, gap, pinion, wheel, nodes=12):
         place = jnp.clip(place, *ends)
 
         def both(x):
-            p, q = mesh.flanks(jnp.clip(place + x * half, *ends))
+            p, q = mesh.flanks(jnp.clip(place + x * half, *ends)[:, None])
             return (pinion(p) + wheel(q))[:, 0]
 
         mean = jnp.tensordot(weights, jax.vmap(both)(jnp.asarray(np.cos(angle))), 1)
@@ -138,7 +139,7 @@ def test_the_gap_is_the_least_of_a_fine_search(mesh, name):
     """On the path and beyond it, as far as corners touch under usual loads (gaps up to 40 um)."""
     pinion, wheel, tolerance = FLANKS[name]
     found = np.asarray(removed_material(mesh, TORQUE, pinion=pinion, wheel=wheel).amount)[:, 0]
-    near = np.asarray(mesh.corner_gap) < 40.0
+    near = np.asarray(mesh.corner_gap)[:, 0] < 40.0
     np.testing.assert_allclose(found[near], search(mesh, pinion, wheel)[near], atol=tolerance)
     nominal = np.asarray(nominal_material(mesh, jnp.asarray(TORQUE), pinion, wheel))[:, 0]
     # what the search is for: the nominal place is far off it
@@ -164,7 +165,7 @@ def test_contacts_rest_where_the_slope_is_zero(mesh, dtype, left):
 def test_more_steps_go_on_towards_the_search(mesh):
     """A relief as steep as they come: 15 um over a millimetre."""
     steep = linear(15.0, 1.0)
-    expected, near = search(mesh, steep, steep), np.asarray(mesh.corner_gap) < 40.0
+    expected, near = search(mesh, steep, steep), np.asarray(mesh.corner_gap)[:, 0] < 40.0
 
     def worst(amount):
         return np.abs(np.asarray(amount)[:, 0] - expected)[near].max()
@@ -183,11 +184,11 @@ def test_a_concave_or_convex_flank_changes_the_pressure(mesh):
     side = mesh.sides[0]
     half = 0.5 * float(side.tip_roll_length - side.start_roll_length)
     # second derivative by the arc, d rho = r_b / rho ds, at the middle of the flank
-    roll, base = np.asarray(side.contact_roll_length), float(side.base_radius)
+    roll, base = np.asarray(side.contact_roll_length)[:, 0], float(side.base_radius)
     middle = np.abs(roll - float(side.tip_roll_length - half)) < 0.2
     bend = 1e-3 * 2 * amount / half**2 * (base / roll) ** 2 * radius(mesh)
     np.testing.assert_allclose(np.asarray(crowned.relative_curvature)[:, 0][middle], bend[middle], rtol=0.05)
-    plain = jg.contact.solve_removed(mesh, TORQUE, crowned.gap - mesh.corner_gap[:, None])
+    plain = jg.contact.solve_removed(mesh, TORQUE, crowned.gap - mesh.corner_gap)
     loaded = np.asarray(crowned.line_load)[:, 0] > 0
     ratio = np.asarray(crowned.contact_pressure / plain.contact_pressure)[:, 0]
     here = middle & loaded & inner(mesh)

@@ -85,7 +85,7 @@ def test_one_pair_of_constant_stiffness_is_the_one_dimensional_analysis(crowning
     model, slices = jg.legacy_compliance(), 5
     sizes = jg.Resolution(positions=4, slices=slices, pairs=2)  # with as many modes as slices
     mesh = jg.prepare(PAIR, compliance=model, resolution=sizes, support=support(gearbox(), 0))
-    body = mesh.coupling.bodies[0]._replace(share=jnp.eye(slices), rest=jnp.zeros(()))
+    body = mesh.coupling.bodies[0]._replace(share=jnp.eye(slices) * slices / PAIR.face_width, rest=jnp.zeros(()))
     mesh = replace(mesh, coupling=replace(mesh.coupling, modes=jnp.eye(slices), bodies=(body,)))
     aligned = solved(None, compliance=model, pinion=jg.LeadSlope(0.0), sizes=sizes)
     mean = float(aligned.line_load[0, 0, 0])

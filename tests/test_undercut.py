@@ -86,7 +86,7 @@ def test_an_undercut_pinion_under_load_touches_beyond_the_form_circle_with_its_e
     cycle = jg.solve(mesh, 5.0)
     assert bool(cycle.converged.all()) and np.all(np.isfinite(cycle.transmission_error))
     np.testing.assert_allclose(jnp.sum(cycle.pair_force, axis=0), cycle.force, rtol=1e-9)
-    before = np.asarray(mesh.path) < float(mesh.path_of_contact.start)
+    before = np.asarray(mesh.path)[:, 0] < float(mesh.path_of_contact.start)
     assert np.asarray(cycle.pair_force)[before].max() > 0.05 * float(cycle.force)
     edge = np.asarray(cycle.corner_pressure)[:, 0][before]
     assert edge.max() > 0 and np.all(np.asarray(cycle.contact_pressure)[:, 0][before] == 0)

@@ -112,7 +112,7 @@ def test_depths_of_the_50_50_pair_are_the_known_ones():
 
 def test_nothing_wears_at_the_pitch_point(life):
     cycle = jax.tree.map(lambda leaf: np.asarray(leaf)[0], life.cycles)
-    pitch = np.asarray(cycle.kinematics.path) == 0
+    pitch = np.asarray(cycle.kinematics.path)[:, 0] == 0
     assert pitch.any() and np.asarray(cycle.line_load)[:, 0][pitch].all()
     for depth in passage_depth(cycle, COEFFICIENT):
         assert (np.asarray(depth)[:, 0][pitch] == 0).all()
@@ -124,11 +124,11 @@ def test_flanks_slide_by_the_closed_form_and_beyond_the_path_on(mesh, place):
     inverse = 1 / float(path.pinion_base_radius) + 1 / float(path.wheel_base_radius)
     flank, corner = np.asarray(place.sliding).sum(axis=-1)[:, :, 0]
     np.testing.assert_allclose(flank.sum(), 0.5 * (float(path.start) ** 2 + float(path.end) ** 2) * inverse, rtol=1e-12)
-    beyond = np.asarray(mesh.outside) > float(path.base_pitch) / 16
+    beyond = np.asarray(mesh.outside)[:, 0] > float(path.base_pitch) / 16
     assert (flank[beyond] == 0).all() and (corner[beyond] > 0).all()
     # corners begin to slide as fast as the flanks did at the end of the path
     piece = float(path.base_pitch) / 16
-    nearest = np.where(beyond, np.asarray(mesh.outside), np.inf).argmin()
+    nearest = np.where(beyond, np.asarray(mesh.outside)[:, 0], np.inf).argmin()
     expected = piece * inverse * max(-float(path.start), float(path.end))
     assert 0.5 * expected < corner.ravel()[nearest] < 1.2 * expected
 
@@ -159,9 +159,9 @@ def test_every_contact_leaves_its_wear_where_it_is(mesh, place):
     still_volume, volume = (np.einsum("gpsk,gk->gp", depth, place.arc) for depth in depths)
     np.testing.assert_allclose(volume, still_volume, rtol=1e-12)
     for gear, side in enumerate(mesh.sides):
-        arc = np.asarray(side.contact_roll_length) ** 2 / (2 * float(side.base_radius))
+        arc = np.asarray(side.contact_roll_length)[:, 0] ** 2 / (2 * float(side.base_radius))
         ends = np.asarray(place.roll_length)[gear, [0, -1]] ** 2 / (2 * float(side.base_radius))
-        inner = (arc > ends[0] + 0.3) & (arc < ends[1] - 0.3) & (np.asarray(mesh.outside) == 0)
+        inner = (arc > ends[0] + 0.3) & (arc < ends[1] - 0.3) & (np.asarray(mesh.outside)[:, 0] == 0)
         assert inner.sum() > 10
         np.testing.assert_allclose(still[gear, :, 0][inner], arc[inner], atol=1e-3)
         away = (shifted - still)[gear, :, 0][inner]
@@ -224,7 +224,7 @@ def test_worn_volume_is_coefficient_times_force_times_sliding(mesh, place):
 def slid_force(mesh, life):
     """Force times sliding of the first contacts of a life [N mm], by the closed form of the sliding on the path."""
     path, piece = mesh.path_of_contact, float(mesh.path_of_contact.base_pitch) / mesh.resolution.positions
-    ends = np.clip(np.asarray(mesh.path)[..., None] + 0.5 * piece * np.array([-1, 1]), path.start, path.end)
+    ends = np.clip(np.asarray(mesh.path)[:, 0, :, None] + 0.5 * piece * np.array([-1, 1]), path.start, path.end)
     sliding = np.diff(0.5 * ends * np.abs(ends), axis=-1)
     sliding = sliding[..., 0] * (1 / float(path.pinion_base_radius) + 1 / float(path.wheel_base_radius))
     force = np.asarray(life.cycles.line_load)[0] * np.asarray(mesh.slice_width)[:, None]
@@ -271,7 +271,7 @@ def test_depth_does_not_depend_on_the_number_of_positions():
         path = mesh.path_of_contact
         # a load that rises and falls smoothly over the path of contact
         share = jnp.clip((mesh.path - path.start) / (path.end - path.start), 0.0, 1.0)
-        load = 100.0 * jnp.sin(jnp.pi * share)[:, None] ** 2
+        load = 100.0 * jnp.sin(jnp.pi * share) ** 2
         return np.asarray(worn(load, jnp.zeros_like(load), 1e-18, deposit(mesh, jnp.asarray(TORQUE), 9)))[:, 0, 0]
 
     fine = depth(jg.Resolution(positions=96, pairs=2, slide_steps=0))

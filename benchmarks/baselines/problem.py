@@ -96,7 +96,7 @@ def plain(mesh) -> Problem:
     count = mesh.resolution.contact_nodes
     angle = np.pi * np.arange(1, count + 1) / (count + 1)
     offset = np.clip(np.cos(angle)[:, None, None] * half_width, lowest, highest)
-    loads = [tooth_load(outline(side.gear), side.contact_roll_length) for side in mesh.sides]
+    loads = [tooth_load(outline(side.gear), side.contact_roll_length[:, 0]) for side in mesh.sides]
     rolls = [np.asarray(load.roll_length) for load in loads]
     beyond = [
         np.maximum(roll + sign * offset * float(gear.base_radius) / roll, 0.0) - float(gear.tip_roll_length)
@@ -125,10 +125,10 @@ def plain(mesh) -> Problem:
         force=force,
         slice_width=np.asarray(mesh.slice_width),
         crowning=2 * CROWNING * along**2 if slices > 1 else np.zeros(1),
-        structure=np.asarray(mesh.structure),
+        structure=np.asarray(mesh.structure)[:, :, 0],
         law=law,
-        corner_gap=np.asarray(mesh.corner_gap),
-        lever=np.asarray(mesh.lever),
+        corner_gap=np.asarray(mesh.corner_gap)[:, 0],
+        lever=np.asarray(mesh.lever)[:, 0],
         beyond_tip=np.stack(beyond),
         node_weight=2 / (count + 1) * np.sin(angle) ** 2,
     )

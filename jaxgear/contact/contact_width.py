@@ -13,7 +13,7 @@ from jaxtyping import Array, Float
 
 from ..geometry import GearPair, reduced_radius
 from ..microgeometry import AbstractModification, Flank, NoModification, terms
-from ..numerics import by_numbers, over_slices, safe_sqrt
+from ..numerics import by_numbers, safe_sqrt
 from .kinematics import Side
 from .mesh import Mesh
 
@@ -72,8 +72,8 @@ class Place(NamedTuple):
 def place_of(mesh: Mesh, torque: Scalar, line_load: Real | None = None) -> Place:
     """Nominal contacts of a mesh, as wide as the line loads [N/mm] make them; by default `usual_load`."""
     first, second = mesh.sides
-    radius = over_slices(reduced_radius(first.contact_roll_length, second.contact_roll_length))
-    outside, path, contact = mesh.kinematics.contact_outside, mesh.kinematics.contact_path, mesh.path_of_contact
+    radius = reduced_radius(first.contact_roll_length, second.contact_roll_length)
+    outside, path, contact = mesh.kinematics.outside, mesh.kinematics.path, mesh.path_of_contact
     over = []
     for side in (first, second):
         # arc length of the tip's involute over the path that is left out
@@ -89,15 +89,14 @@ def place_of(mesh: Mesh, torque: Scalar, line_load: Real | None = None) -> Place
     sides = _side(mesh, first, 1.0), _side(mesh, second, -1.0)
     narrowest = _NARROWEST * radius
     half_width = jnp.maximum(_half_width(mesh, torque, line_load), narrowest)
-    beyond, before, ahead = map(over_slices, (beyond, inside[1], inside[0]))
-    return Place(radius, half_width, beyond, -before, ahead, sides)
+    return Place(radius, half_width, beyond, -inside[1], inside[0], sides)
 
 
 def _side(mesh: Mesh, side: Side, direction: float) -> PlaceSide:
     def number(value: Array) -> Array:
         return jnp.reshape(value, (1, 1, 1))
 
-    roll_length = over_slices(side.contact_roll_length)
+    roll_length = side.contact_roll_length
     return PlaceSide(
         # arc length of an involute: ds = rho / r_b d rho
         direction * side.base_radius / roll_length,
@@ -213,7 +212,7 @@ def within(x: Real, low: Real, high: Real) -> Real:
 def _half_width(mesh: Mesh, torque: Scalar, line_load: Real | None) -> Float[Array, "pairs #slices positions"]:
     """Half width of the contact over which modifications are averaged [mm]."""
     load = usual_load(mesh, torque) if line_load is None else line_load
-    return safe_sqrt(over_slices(mesh.width_factor) * load)
+    return safe_sqrt(mesh.width_factor * load)
 
 
 def usual_load(mesh: Mesh, torque: Scalar) -> Float[Array, "pairs #slices positions"]:
@@ -222,11 +221,11 @@ def usual_load(mesh: Mesh, torque: Scalar) -> Float[Array, "pairs #slices positi
     It is the full one where a pair is alone and falls to the ends of the path of contact from there, without the jump
     where a second pair comes into contact.
     """
-    path, contact = mesh.kinematics.contact_path, mesh.path_of_contact
+    path, contact = mesh.kinematics.path, mesh.path_of_contact
     inside = jnp.minimum(path - contact.start, contact.end - path)
     shared = jnp.maximum(contact.end - contact.start - mesh.pair.base_pitch, _LEAST_SHARED)
     share = jnp.clip(_SHARE_AT_ENDS + (1 - _SHARE_AT_ENDS) * inside / shared, _SHARE_AT_ENDS, 1.0)
-    return over_slices(share) * full_load(mesh.pair, torque)
+    return share * full_load(mesh.pair, torque)
 
 
 def full_load(pair: GearPair, torque: Scalar) -> Scalar:

@@ -8,7 +8,7 @@ from jaxtyping import Array, Float, Int8
 from ..compliance.plane import combined_modulus
 from ..geometry import Margins, reduced_radius
 from ..microgeometry import AbstractModification
-from ..numerics import over_batch, over_slices, program, safe_sqrt
+from ..numerics import over_batch, program, safe_sqrt
 from .kinematics import Kinematics, Side
 from .operating_point import OperatingPoint
 from .status import WithStatus, reason
@@ -39,9 +39,8 @@ def flank_pressure(kinematics: Kinematics, line_load: Load, relative_curvature: 
     """
     pinion, wheel = kinematics.sides
     reduced = reduced_radius(pinion.contact_roll_length, wheel.contact_roll_length)
-    inside = kinematics.contact_outside <= 0
-    reduced = over_slices(reduced) / jnp.maximum(1 + relative_curvature, FLATTEST)
-    return jnp.where(over_slices(inside), _hertz(kinematics, line_load, reduced), 0.0)
+    reduced = reduced / jnp.maximum(1 + relative_curvature, FLATTEST)
+    return jnp.where(kinematics.outside <= 0, _hertz(kinematics, line_load, reduced), 0.0)
 
 
 def corner_pressure(kinematics: Kinematics, line_load: Load) -> Load:
@@ -54,8 +53,7 @@ def corner_pressure(kinematics: Kinematics, line_load: Load) -> Load:
     of_wheel = kinematics.wheel_edge
     edge = jnp.where(of_wheel, wheel.gear.edge_radius, pinion.gear.edge_radius)
     mate = jnp.where(of_wheel, pinion.contact_roll_length, wheel.contact_roll_length)
-    outside = over_slices(kinematics.contact_outside > 0)
-    return jnp.where(outside, _hertz(kinematics, line_load, over_slices(reduced_radius(edge, mate))), 0.0)
+    return jnp.where(kinematics.outside > 0, _hertz(kinematics, line_load, reduced_radius(edge, mate)), 0.0)
 
 
 def _hertz(kinematics: Kinematics, line_load: Load, reduced) -> Load:

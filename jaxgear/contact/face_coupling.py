@@ -80,7 +80,7 @@ _MOST_MISSED = 0.05
 
 def slices_alike(
     structures: Float[Array, "gears pairs pairs slices positions"],
-) -> tuple[Float[Array, "gears pairs pairs positions"], Float[Array, "pairs slices positions"]]:
+) -> tuple[Float[Array, "gears pairs pairs 1 positions"], Float[Array, "pairs slices positions"]]:
     """Compliances of slices that touch at different heights of the teeth, by those of one slice and a scale of each.
 
     Between slices s and t of pairs p and j they are d[p, s] C[p, j] d[j, t], with d^2 the compliance of every pair in
@@ -96,13 +96,13 @@ def slices_alike(
     own = jnp.stack([total[i, i] for i in range(len(total))])
     mean = jnp.mean(own, axis=1)
     scale = jnp.sqrt(own / mean[:, None])
-    return jnp.mean(structures / (scale[:, None] * scale[None])[None], axis=3), scale
+    return jnp.mean(structures / (scale[:, None] * scale[None])[None], axis=3, keepdims=True), scale
 
 
 def coupling_of(
     moving: Kinematics,
     spreading: Spreading,
-    structures: Float[Array, "gears pairs pairs *own positions"],
+    structures: Float[Array, "gears pairs pairs #slices positions"],
     scale: Float[Array, "pairs slices positions"] | None,
     support: AbstractSupport | None,
     slopes: Float[Array, "gears"],
@@ -125,20 +125,22 @@ def coupling_of(
         return None
     kernels = spreading.kernels
     modes, shares, rests = few_modes(kernels, sizes.face_modes, spreading.ends, sizes.parts)
-    weight = np.ones(sizes.slices) if sizes.slice_weights is None else sizes.slice_weights
+    mean = jnp.mean(moving.slice_width)
+    weight = moving.slice_width / mean
     if sizes.parts is not None:  # modes of the loads times the roots of the widths
-        modes = modes / jnp.asarray(np.sqrt(weight)[:, None], modes.dtype)
+        modes = modes / jnp.sqrt(weight)[:, None]
     # gears that spread loads alike are one body
-    compliances = structures if len(kernels) > 1 else jnp.sum(structures, axis=0)[None]
-    bodies = tuple(map(Body, compliances, shares, rests))
+    compliances = structures[:, :, :, 0]
+    compliances = compliances if len(kernels) > 1 else jnp.sum(compliances, axis=0)[None]
+    bodies = tuple(map(Body, compliances, shares / mean, rests))
     parts = [_tilt(moving, slopes)] if moving.helical else []
     if support is not None:
         parts.append(support.influence(moving.face_coordinate))
     if not parts:
         return SliceCoupling(modes, bodies, scale)
     bends = jnp.asarray(_polynomials(sizes), kernels.dtype)[:, : 2 if support is None else None]
-    loads = jnp.asarray(weight[:, None], bends.dtype) * bends
-    influence = reduce(add, parts).astype(kernels.dtype) * jnp.mean(moving.slice_width)
+    loads = weight[:, None] * bends
+    influence = reduce(add, parts).astype(kernels.dtype)
     return SliceCoupling(modes, bodies, scale, bends, jnp.linalg.multi_dot([loads.T, influence, loads]))
 
 

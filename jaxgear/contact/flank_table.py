@@ -44,6 +44,8 @@ def flank_table(
     if gear not in ("pinion", "wheel"):
         raise ValueError(f'gear = {gear!r} must be "pinion" or "wheel"')
     # the last pair is the first along the path; every roll length beyond the active profile only continues the table
+    if kinematics.helical:
+        raise ValueError("kinematics is of helical gears: flank_table is known of spur gears alone")
     path = kinematics.path[::-1].reshape(-1)
     inside = kinematics.outside[::-1].reshape(-1) <= 0
     amount = jnp.moveaxis(field, 1, 2)[::-1].reshape(-1, sizes.slices)

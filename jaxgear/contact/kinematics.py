@@ -75,7 +75,7 @@ def corner_gap(
 
 
 Scalar = Float[Array, ""]
-Field = Float[Array, "pairs *slices positions"]  # with slices where each of them has its own phase
+Field = Float[Array, "pairs #slices positions"]  # one slice where all are at the same phase
 
 
 class Side(Checked):
@@ -85,8 +85,7 @@ class Side(Checked):
         gear: the gear, with numbers where that of the pair leaves the diameters of tip or bore open.
         start_roll_length, pitch_roll_length: roll lengths at the start of the active profile and at the pitch point
             [mm].
-        contact_roll_length: roll length of every contact [mm], shape (pairs, positions); of helical gears (pairs,
-            slices, positions).
+        contact_roll_length: roll length of every contact [mm], shape (pairs, 1 or slices, positions).
         face_middle: middle of the common face of the pair, from the middle of the gear's own face [mm].
         common_width: width of the common face, over which both gears overlap [mm].
     """
@@ -158,62 +157,33 @@ class Kinematics(Checked):
         return _phases(self.first_phase, self.resolution.positions)
 
     @property
-    def path(self) -> Float[Array, "*cycles pairs positions"]:
-        """Nominal path position of every pair of spur gears [mm], shape (pairs, positions).
-
-        Raises:
-            ValueError: for helical gears, see `contact_path`.
-        """
-        self._check_spur("path")
-        return self.contact_path
-
-    @property
-    def outside(self) -> Float[Array, "*cycles pairs positions"]:
-        """Distance of every pair of spur gears outside the path of contact [mm], zero on it, shape (pairs, positions).
-
-        Raises:
-            ValueError: for helical gears, see `contact_outside`.
-        """
-        self._check_spur("outside")
-        return self.contact_outside
-
-    def _check_spur(self, name: str) -> None:
-        if self.helical:
-            raise ValueError(
-                f"Kinematics: {name} is of spur gears; helical ones touch elsewhere in every slice of the face: "
-                f"contact_{name} has them, and what asks for {name} does not know helical gears yet"
-            )
-
-    @property
     @over_batch
     @program
-    def contact_path(self) -> Field:
-        """Nominal path position of every contact [mm], shape (pairs, positions); of helical gears (pairs, slices,
-        positions).
-        """
+    def path(self) -> Field:
+        """Nominal path position of every contact [mm], shape (pairs, 1 or slices, positions)."""
         offset = self.resolution.leading - self._count(self.resolution.chosen_pairs)
         middle = (self.phase[None] + offset[:, None]) * self.path_of_contact.base_pitch
         if not self.helical:
-            return middle
+            return middle[:, None]
         return middle[:, None] + (self.face_coordinate * self.pair.path_slope)[None, :, None]
 
     @property
     @over_batch
     @program
-    def contact_outside(self) -> Field:
-        """Distance of every contact outside the path of contact [mm], zero on it, of the shape of `contact_path`."""
-        path, contact = self.contact_path, self.path_of_contact
+    def outside(self) -> Field:
+        """Distance of every contact outside the path of contact [mm], zero on it, of the shape of `path`."""
+        path, contact = self.path, self.path_of_contact
         return jnp.maximum(jnp.maximum(contact.start - path, path - contact.end), 0.0)
 
     @property
     @over_batch
-    def wheel_edge(self) -> Bool[Array, "pairs *slices positions"]:
+    def wheel_edge(self) -> Bool[Array, "pairs #slices positions"]:
         """Whether an edge of the wheel touches the pinion outside the path of contact, and not one of the pinion.
 
         Ahead of the path that is the tip of the wheel, or, where the path begins at the form circle of the pinion, its
         edge there; behind the path the other way round.
         """
-        path, contact = self.contact_path, self.path_of_contact
+        path, contact = self.path, self.path_of_contact
         ahead = (path < contact.start) & (contact.start_shortened <= 0)
         return ahead | ((path > contact.end) & (contact.end_shortened > 0))
 
@@ -257,8 +227,8 @@ class Kinematics(Checked):
 @program
 def _sides(moving: Kinematics) -> tuple[Side, Side]:
     pair, contact = moving.pair, moving.path_of_contact
-    ends = _ends(pair, contact, moving.contact_path)
-    return sides(pair, contact, *_roll_lengths(contact, moving.contact_path, ends, on_both(_touched, *ends)))
+    ends = _ends(pair, contact, moving.path)
+    return sides(pair, contact, *_roll_lengths(contact, moving.path, ends, on_both(_touched, *ends)))
 
 
 def _phases(first: Array, count: int) -> Array:

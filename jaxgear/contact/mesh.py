@@ -17,7 +17,7 @@ from ..compliance.tooth import ToothLoad, tooth_load
 from ..geometry import GearPair, Margins, Outline, PathOfContact, explicit, pair_geometry
 from ..geometry.pair import PairGeometry
 from ..microgeometry import Flank
-from ..numerics import AbstractSpring, Given, SliceCoupling, changed, on_both, over_slices, program
+from ..numerics import AbstractSpring, Given, SliceCoupling, changed, on_both, program
 from ..numerics.programs import begin
 from .covering import check_cover, closing, helical_slices, pairs_alternate, pairs_for
 from .face_coupling import (
@@ -44,30 +44,31 @@ def _for_gears(compliance: AbstractCompliance, outlines: tuple[Outline, Outline]
 
 
 Scalar = Float[Array, ""]
-Field = Float[Array, "pairs *slices positions"]  # with slices where each of them has its own phase
+Field = Float[Array, "pairs #slices positions"]  # one slice where all are at the same phase
 
 
 class Mesh(eqx.Module):
     """A gear pair prepared for contact analysis; made by `prepare`.
 
-    Of helical gears every slice of the face is at its own phase: what has the shape (pairs, positions) below then has
-    (pairs, slices, positions).
+    What is the same in all slices has one for all; of helical gears every slice of the face is at its own phase.
 
     Attributes:
         kinematics: the pair, its path of contact and the array sizes, which the results keep.
         compliance: the compliance model.
         sides: both gears' sides of every contact.
-        corner_gap: gap of the unmodified flanks outside the path of contact [um], shape (pairs, positions).
+        corner_gap: gap of the unmodified flanks outside the path of contact [um], shape (pairs, 1 or slices,
+            positions).
         lever: closing of a pair per unit of transmission error; 1 on the path of contact, less beyond it, because the
             corner's gap opens while the gears turn on.
         margins: distances of the pair from gears that cannot run; the only sign of it where the gears are traced.
         outer_gap: transmission error at which the pairs behind and ahead of those carried along touch if they are not
-            modified [um], shape (2, positions).
-        outer_lever: lever of these outer pairs, shape (2, positions).
+            modified [um], shape (2, 1 or slices, positions).
+        outer_lever: lever of these outer pairs, of the same shape.
         outer_roll_length: of these outer pairs, of the one behind on the pinion and of the one ahead on the wheel [mm],
-            shape (2, positions).
+            of the same shape.
         structure: compliance of both gears under a load that is uniform over the common face, the mean over that face,
-            (pairs, pairs, positions) [um per N/mm]; of helical gears whose slices are not coupled that of every slice.
+            (pairs, pairs, 1, positions) [um per N/mm]; of helical gears whose slices are not coupled that of every
+            slice.
         law: prepared contact law.
         width_factor: squared half width of the contact per line load [mm^2 per N/mm].
         hub: common wind-up of the gear bodies, each over its own face, under a line load over the common one [um per
@@ -93,10 +94,10 @@ class Mesh(eqx.Module):
     corner_gap: Field
     lever: Field
     margins: Margins
-    outer_gap: Float[Array, "2 *slices positions"]
-    outer_lever: Float[Array, "2 *slices positions"]
-    outer_roll_length: Float[Array, "2 *slices positions"]
-    structure: Float[Array, "pairs pairs *own positions"]
+    outer_gap: Float[Array, "2 #slices positions"]
+    outer_lever: Float[Array, "2 #slices positions"]
+    outer_roll_length: Float[Array, "2 #slices positions"]
+    structure: Float[Array, "pairs pairs #slices positions"]
     law: AbstractSpring
     width_factor: Field
     hub: Scalar
@@ -141,12 +142,12 @@ class Mesh(eqx.Module):
 
     @property
     def path(self) -> Field:
-        """Nominal path position of every pair of spur gears [mm], shape (pairs, positions)."""
+        """Nominal path position of every contact [mm], shape (pairs, 1 or slices, positions)."""
         return self.kinematics.path
 
     @property
     def outside(self) -> Field:
-        """Distance of every pair of spur gears outside the path of contact [mm], zero on it."""
+        """Distance of every contact outside the path of contact [mm], zero on it, of the shape of `path`."""
         return self.kinematics.outside
 
     @property
@@ -157,9 +158,7 @@ class Mesh(eqx.Module):
     @property
     def own_structure(self) -> Float[Array, "pairs pairs #slices positions"]:
         """Compliance of every slice on its own [um per N/mm]."""
-        if self.coupling is not None:
-            return self.coupling.local(len(self.structure))
-        return self.structure if self.structure.ndim == 4 else self.structure[:, :, None]
+        return self.structure if self.coupling is None else self.coupling.local(len(self.structure))
 
     @property
     def leans(self) -> bool:
@@ -168,7 +167,7 @@ class Mesh(eqx.Module):
 
     def held(self, gap: Float[Array, "pairs slices positions"]) -> Float[Array, "pairs slices positions"]:
         """A gap of the flanks [um] with the gap of the support."""
-        return gap if self.support_gap is None else gap + over_slices(self.lever) * self.support_gap[None, :, None]
+        return gap if self.support_gap is None else gap + self.lever * self.support_gap[None, :, None]
 
     def support_deflection(self, line_load: Float[Array, "pairs slices positions"]) -> Float[Array, " positions"]:
         """Transmission error by deflection of shafts and tilt of the bodies, alike for all pairs [um].
@@ -178,8 +177,7 @@ class Mesh(eqx.Module):
         """
         if self.coupling is None:
             return jnp.zeros_like(line_load[0, 0])
-        weight = self.slice_width / jnp.mean(self.slice_width)
-        bent = self.coupling.support_deflection(weight, over_slices(self.lever), list(line_load))
+        bent = self.coupling.support_deflection(self.slice_width, self.lever, list(line_load))
         return jnp.zeros_like(line_load[0, 0]) if bent is None else jnp.min(bent, axis=0)
 
     def flanks(self, offset: Given = 0.0) -> tuple[Flank, Flank]:
@@ -198,7 +196,7 @@ class Mesh(eqx.Module):
         rho = side.contact_roll_length
         # arc length of an involute: ds = rho / r_b d rho
         moved = jnp.maximum(rho + offset * side.base_radius / rho, 0.0)
-        return side.flank(over_slices(moved), (self.face_coordinate + side.face_middle)[None, :, None])
+        return side.flank(moved, (self.face_coordinate + side.face_middle)[None, :, None])
 
 
 def prepare(
@@ -319,7 +317,7 @@ class _Places(eqx.Module):
     Attributes:
         kinematics, sides: as of the mesh.
         points, outer: contacts of the pairs carried along, and of those behind and ahead of them.
-        loads: on pinion and wheel, fields of shape (pairs, positions), of helical gears those of all slices in a row.
+        loads: on pinion and wheel, fields of shape (pairs, positions), those of all slices in a row.
         contact: flanks at the contacts.
         spreading: of loads over the face.
     """
@@ -345,11 +343,11 @@ def _places_of(
     """The places of an `explicit` pair in the sizes `of_arrays`; `plane` is that of the contact."""
     outlines, path = gears.outlines, gears.path_of_contact
     moving = kinematics(pair, first_phase, resolution, plane, path)
-    points = contacts(pair, path, moving.contact_path, resolution.extended_contact)
-    # what compliances know of are pairs at positions: of helical gears those of all slices
+    points = contacts(pair, path, moving.path, resolution.extended_contact)
+    # what compliances know of are pairs at positions: those of all slices
     rolls = [at.reshape(len(at), -1) for at in (points.pinion_roll_length, points.wheel_roll_length)]
     pinion, wheel = on_both(lambda given: tooth_load(*given), *zip(outlines, rolls))
-    beyond = jnp.stack([moving.contact_path[-1] - path.base_pitch, moving.contact_path[0] + path.base_pitch])
+    beyond = jnp.stack([moving.path[-1] - path.base_pitch, moving.path[0] + path.base_pitch])
     outer = contacts(pair, path, beyond, resolution.extended_contact)
     return _Places(
         kinematics=moving,
@@ -370,13 +368,10 @@ def _arrays_of(
     moving, points, (pinion, wheel) = places.kinematics, places.points, places.loads
     law = compliance.law(places.contact, pinion, wheel, points.beyond_tip.reshape(pinion.roll_length.shape))
     structures = places.spreading.shares[:, None, None, None] * compliance.structure(pinion, wheel)
-    width_factor, scale = places.contact.width_factor[:, 0], None
-    if moving.helical:
-        shape = moving.contact_path.shape
-        law = jax.tree.map(lambda leaf: leaf.reshape(shape), law)
-        width_factor, structures = width_factor.reshape(shape), structures.reshape(*structures.shape[:-1], *shape[1:])
-        if moving.resolution.is_coupled:
-            structures, scale = slices_alike(structures)
+    shape, scale = moving.path.shape, None
+    structures = structures.reshape(*structures.shape[:-1], *shape[1:])
+    if moving.helical and moving.resolution.is_coupled:
+        structures, scale = slices_alike(structures)
     hubs = compliance.hub(pinion, wheel)
     if not even:
         pair = moving.pair
@@ -393,8 +388,8 @@ def _arrays_of(
         outer_lever=places.outer.lever,
         outer_roll_length=jnp.stack([places.outer.pinion_roll_length[0], places.outer.wheel_roll_length[1]]),
         structure=structures[0] + structures[1],
-        law=law,
-        width_factor=width_factor,
+        law=jax.tree.map(lambda leaf: leaf.reshape(shape), law),
+        width_factor=places.contact.width_factor.reshape(shape),
         hub=jnp.sum(hubs),
         slice_width=moving.slice_width,
         coupling=coupling_of(moving, places.spreading, structures, scale, support, slopes),

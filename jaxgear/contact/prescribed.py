@@ -6,7 +6,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..microgeometry import AbstractModification
-from ..numerics import Checked, Numbers, check, over_slices, program, real, result
+from ..numerics import Checked, Numbers, check, program, real, result
 from .face_coupling import check_torque
 from .mesh import Mesh
 from .operating_point import Torque, operating_point_of
@@ -104,9 +104,8 @@ def _solve_at(mesh: Mesh, approach: Curve, removed: RemovedMaterial, shared: Sca
     """
     structure = mesh.own_structure
     if shared is not None:
-        lever = over_slices(mesh.lever)
-        structure = structure + shared * mesh.slice_width[0] * lever[:, None] * lever[None]
-    gap = over_slices(mesh.corner_gap) + removed.amount
+        structure = structure + shared * mesh.slice_width[0] * mesh.lever[:, None] * mesh.lever[None]
+    gap = mesh.corner_gap + removed.amount
     contact = contact_of(mesh, gap, removed.shift, approach=approach, compliance=structure)
     solution = contact.solution
     pair_force = pair_forces(mesh, solution.line_load)
@@ -138,7 +137,7 @@ class ForcedContact(WithStatus, eqx.Module):
 @program
 def solve_forces(mesh: Mesh, force: Curve, removed: RemovedMaterial) -> ForcedContact:
     """Contact under a force on the line of action at every mesh position [N], at least zero, shape (positions,)."""
-    contact = contact_of(mesh, over_slices(mesh.corner_gap) + removed.amount, removed.shift, load=force)
+    contact = contact_of(mesh, mesh.corner_gap + removed.amount, removed.shift, load=force)
     status = contact_status(mesh, contact, contact.solution.approach, removed)
     return ForcedContact(contact.solution.line_load, status)
 

@@ -21,7 +21,6 @@ from ..numerics import (
     concrete,
     minimum,
     opening,
-    over_slices,
     program,
     solve_contact,
     stored,
@@ -296,7 +295,7 @@ def contact_of(mesh: Mesh, gap: Load, shift: Float[Array, "pairs #slices positio
         **{"compliance": mesh.own_structure, **given},
         law=mesh.law.moved(shift),
         gap=mesh.held(gap),
-        lever=over_slices(mesh.lever),
+        lever=mesh.lever,
         weight=mesh.slice_width,
         coupling=mesh.coupling,
     )
@@ -314,7 +313,7 @@ def _of_two_pairs(mesh: Mesh, problem: ContactProblem) -> Contact:
     """
     coupling, known = problem.coupling, problem.known
     assert coupling is not None and coupling.scale is not None  # `pairs_alternate` asks for both
-    distance = jnp.abs(mesh.kinematics.contact_path)
+    distance = jnp.abs(mesh.kinematics.path)
     nearest = [jnp.argmin(distance[first::2], axis=0) for first in (0, 1)]
     chosen = jnp.stack([nearest[i % 2] == i // 2 for i in range(len(distance))])
 
@@ -359,12 +358,12 @@ def _solved(mesh: Mesh, problem: ContactProblem) -> ContactSolution:
     assert coupling.support is not None and coupling.support_modes is not None
     even, leaning = coupling.support_modes.T
     by_load = coupling.support[1, 0] * even[0]
-    total = jnp.atleast_1d(problem.load / jnp.mean(mesh.slice_width))
+    total = jnp.atleast_1d(problem.load)
     gap = (leaning[:, None] * by_load * total[None])[None]
     upright = replace(coupling, support_modes=None, support=None)
 
     def leant(line_load: Load) -> Curve:
-        force = problem.relative_weight[:, None] * sum(lever * q for lever, q in zip(problem.lever, line_load))
+        force = problem.weight[:, None] * sum(lever * q for lever, q in zip(problem.lever, line_load))
         return by_load * jnp.sum(leaning[:, None] * force, axis=0)
 
     known = problem.known
@@ -377,9 +376,7 @@ def _solved(mesh: Mesh, problem: ContactProblem) -> ContactSolution:
 
 def pair_forces(mesh: Mesh, line_load: Load) -> Float[Array, "pairs positions"]:
     """Force on the line of action that every pair contributes under line loads [N/mm], in N."""
-    if mesh.lever.ndim == 3:
-        return jnp.sum(mesh.lever * line_load * mesh.slice_width[None, :, None], axis=1)
-    return mesh.lever * jnp.sum(line_load * mesh.slice_width[None, :, None], axis=1)
+    return jnp.sum(mesh.lever * line_load * mesh.slice_width[None, :, None], axis=1)
 
 
 def contact_status(mesh: Mesh, contact: Contact, error: Curve, removed: RemovedMaterial) -> Statuses:
@@ -414,11 +411,10 @@ def outermost(mesh: Mesh, removed: RemovedMaterial) -> Curve:
     amount, gain = removed.amount, _sliding_gain(mesh, removed.shift)
     edge = jnp.stack([amount[-1, :, 0], amount[0, :, -1]])
     fall = jnp.minimum(edge - jnp.stack([amount[-1, :, 1], amount[0, :, -2]]), 0.0)
-    gap, lever = map(over_slices, (mesh.outer_gap, mesh.outer_lever))
     left = (edge - 2 * gain)[..., None] + fall[..., None] * _outer_steps(mesh)
     if mesh.support_gap is not None:
-        left = left + lever * mesh.support_gap[None, :, None]
-    return jnp.min(gap + left / lever, axis=(0, 1))
+        left = left + mesh.outer_lever * mesh.support_gap[None, :, None]
+    return jnp.min(mesh.outer_gap + left / mesh.outer_lever, axis=(0, 1))
 
 
 def _outer_steps(mesh: Mesh) -> Float[Array, "2 #slices positions"]:
@@ -428,15 +424,15 @@ def _outer_steps(mesh: Mesh) -> Float[Array, "2 #slices positions"]:
     pinion, wheel = (side.contact_roll_length for side in mesh.sides)
     second = min(1, mesh.resolution.positions - 1)  # of a single position there is no step, and nothing falls
     edges = [(pinion[-1, ..., 0], pinion[-1, ..., second]), (wheel[0, ..., -1], wheel[0, ..., -1 - second])]
-    first, next_one = (over_slices(jnp.stack(each)[..., None]) for each in zip(*edges))
+    first, next_one = (jnp.stack(each)[..., None] for each in zip(*edges))
     one = jnp.maximum(jnp.abs(first - next_one), 1e-6 * first)
-    return jax.lax.stop_gradient(jnp.abs(over_slices(mesh.outer_roll_length) - first) / one)
+    return jax.lax.stop_gradient(jnp.abs(mesh.outer_roll_length - first) / one)
 
 
 def _sliding_gain(mesh: Mesh, shift) -> Float[Array, "2 slices"]:
     """Fall of the gap by a slope at the edges of the base pitch, R s^2 / 2, the larger of two positions [um]."""
     ends = [(-1, slice(None, 2)), (0, slice(-2, None))]
-    rolls = [[over_slices(side.contact_roll_length)[pair, :, places] for side in mesh.sides] for pair, places in ends]
+    rolls = [[side.contact_roll_length[pair, :, places] for side in mesh.sides] for pair, places in ends]
     gains = [500 * shift[pair, :, places] ** 2 / reduced_radius(*both) for (pair, places), both in zip(ends, rolls)]
     return jnp.stack([jnp.max(gain, axis=-1) for gain in gains])
 
@@ -450,12 +446,12 @@ def _solve_removed(
     removed = jax.tree.map(lambda field: field.astype(force.dtype), removed)
     # stored, or a compiler works the material out again for the few places that the status looks at
     removed = RemovedMaterial(stored(removed.amount), stored(removed.shift), removed.relative_curvature)
-    gap = over_slices(mesh.corner_gap) + removed.amount
+    gap = mesh.corner_gap + removed.amount
     windup = mesh.hub * force / mesh.pair.face_width
     known = known and known._replace(approach=known.approach - windup)
     contact = contact_of(mesh, gap, removed.shift, load=force, known=known)
     solution = contact.solution
-    unloaded = minimum(contact.gap / over_slices(mesh.lever), axis=(0, 1))
+    unloaded = minimum(contact.gap / mesh.lever, axis=(0, 1))
     status = contact_status(mesh, contact, solution.approach, removed)
     if mesh.support_torque is not None:
         status = status_of({Status.OUT_OF_VALIDITY: ~holds_at(mesh.support_torque, torque)}, status)

@@ -14,7 +14,7 @@ from ..contact.operating_point import Torque, operating_point_of
 from ..contact.solve import check_mesh, more_pairs_help
 from ..contact.status import Status, status_of
 from ..microgeometry import AbstractModification
-from ..numerics import Given, check, concrete, over_slices, program, real, whole
+from ..numerics import Given, check, concrete, program, real, whole
 from ..numerics.programs import is_eager
 from .drive_and_coast import Both, Static, coast_flanks, drive_flanks, static
 from .force import AbstractMeshForce
@@ -129,8 +129,7 @@ def interpolated(deviation: Given, of: Mesh, mesh: Mesh) -> Float[Array, "pairs 
 
     wide = of.resolution.slices
     there, here = (
-        jnp.broadcast_to(path, (wide, path.shape[-1]))
-        for path in (rows(over_slices(each.kinematics.contact_path)) for each in (of, mesh))
+        jnp.broadcast_to(path, (wide, path.shape[-1])) for path in (rows(each.kinematics.path) for each in (of, mesh))
     )
     found = jax.vmap(jnp.interp)(here, there, rows(jnp.asarray(deviation)))
     return jnp.moveaxis(found.reshape(wide, -1, mesh.resolution.positions), 0, 1)[::-1]

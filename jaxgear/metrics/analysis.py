@@ -9,7 +9,7 @@ from jax.extend.core import get_opaque_trace_state
 from jaxtyping import Array, Float
 
 from ..contact import Mesh, MeshCycle, OperatingPoint, removed_material
-from ..numerics import Checked, over_slices
+from ..numerics import Checked
 
 _Found = TypeVar("_Found")
 Settings = TypeVar("Settings", bound=Checked)
@@ -77,7 +77,7 @@ class Analysis:
         """
         cycle, mesh = self.cycle, self.prepared_mesh
         removed = removed_material(mesh, cycle.torque, **self.flanks)
-        deviation = cycle.gap - over_slices(mesh.corner_gap) - removed.amount
+        deviation = cycle.gap - mesh.corner_gap - removed.amount
         if cycle.pinion is None or cycle.wheel is None:
             return deviation
         return jax.lax.stop_gradient(deviation)  # of the design it does not depend but by rounding

@@ -15,7 +15,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..contact import MeshCycle
-from ..numerics import Checked, maximum, minimum, over_batch, over_slices, program, result, safe_divide
+from ..numerics import Checked, maximum, minimum, over_batch, program, result, safe_divide
 from ..shafts import face_load_factor as factor_of
 from ..shafts import tooth_height
 from ..shafts.face_load import root_exponent
@@ -65,33 +65,27 @@ def effective_contact_ratio(cycle: MeshCycle) -> Scalar:
 def contact_shock(cycle: MeshCycle) -> ContactShock:
     """Loaded path length beyond the ends of the path of contact, and the largest corner force."""
     kinematics = cycle.kinematics
-    contact, path = kinematics.path_of_contact, kinematics.contact_path
-    fraction = _loaded_fraction(cycle.opening if kinematics.helical else minimum(cycle.opening, axis=1))
+    contact, path = kinematics.path_of_contact, kinematics.path
+    fraction = _loaded_fraction(cycle.opening if kinematics.helical else minimum(cycle.opening, axis=1)[:, None])
     step = contact.base_pitch / kinematics.resolution.positions
     # Every step [path, path + step] counts with its loaded length minus the part of it that lies on the theoretical
     # path: contact is unbroken, so a step across an end of the path is loaded on the inside first.
     before = jnp.clip(contact.start - path, 0.0, step)
     after = jnp.clip(path + step - contact.end, 0.0, step)
     before, after = (jnp.maximum(fraction * step - (step - part), 0.0) for part in (before, after))
-    if kinematics.helical:  # over pairs and positions
-        approach, recess = (maximum(jnp.sum(part, axis=(0, 2))) for part in (before, after))
-    else:
-        approach, recess = jnp.sum(before), jnp.sum(after)
+    approach, recess = (maximum(jnp.sum(part, axis=(0, 2))) for part in (before, after))
     return ContactShock(approach, recess, maximum(corner_force(cycle)))
 
 
 def corner_force(cycle: MeshCycle) -> Float[Array, "pairs positions"]:
     """Force of every pair beyond the path of contact [N]."""
-    outside = cycle.kinematics.contact_outside > 0
-    if cycle.kinematics.helical:
-        return jnp.sum(jnp.where(outside, slice_forces(cycle), 0.0), axis=1)
-    return jnp.where(outside, cycle.pair_force, 0.0)
+    return jnp.sum(jnp.where(cycle.kinematics.outside > 0, slice_forces(cycle), 0.0), axis=1)
 
 
 def slice_forces(cycle: MeshCycle) -> Float[Array, "pairs slices positions"]:
     """Force of every slice [N], shape (pairs, slices, positions): `pair_force` in proportion to the line loads."""
     load = cycle.line_load * cycle.kinematics.slice_width[None, :, None]
-    return load * over_slices(safe_divide(cycle.pair_force, jnp.sum(load, axis=1)))
+    return load * safe_divide(cycle.pair_force, jnp.sum(load, axis=1))[:, None]
 
 
 @partial(jax.jit, inline=True)

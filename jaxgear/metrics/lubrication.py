@@ -14,7 +14,7 @@ from jaxtyping import Array, Float
 from ..compliance.plane import combined_modulus
 from ..contact import MeshCycle
 from ..geometry import GearPair, path_of_contact, reduced_radius
-from ..numerics import Given, check, over_batch, over_slices, real, safe_divide, safe_power, safe_sqrt
+from ..numerics import Given, check, over_batch, real, safe_divide, safe_power, safe_sqrt
 from .load_distribution import slice_forces
 from .lubricant import FrictionLaw, Lubricant
 
@@ -54,13 +54,12 @@ def flash_temperature(
 def _flash(cycle: MeshCycle, speed, friction) -> Load:
     kinematics, (pinion, wheel) = cycle.kinematics, cycle.sides
     pair = kinematics.pair
-    pinion_speed, wheel_speed = kinematics.path_of_contact.rolling_speeds(kinematics.contact_path, speed)
-    reduced = over_slices(_normal(pair, reduced_radius(pinion.contact_roll_length, wheel.contact_roll_length)))
+    pinion_speed, wheel_speed = kinematics.path_of_contact.rolling_speeds(kinematics.path, speed)
+    reduced = _normal(pair, reduced_radius(pinion.contact_roll_length, wheel.contact_roll_length))
     modulus = combined_modulus(pair.pinion.material, pair.wheel.material, kinematics.plane)
-    speeds = over_slices(pinion_speed), over_slices(wheel_speed)
     sinks = pair.pinion.material.thermal_contact_coefficient, pair.wheel.material.thermal_contact_coefficient
-    rise = flash_rise(friction, cycle.line_load, reduced, modulus, speeds, sinks)
-    return jnp.where(over_slices(kinematics.contact_outside <= 0), rise, 0.0)
+    rise = flash_rise(friction, cycle.line_load, reduced, modulus, (pinion_speed, wheel_speed), sinks)
+    return jnp.where(kinematics.outside <= 0, rise, 0.0)
 
 
 def flash_rise(
@@ -112,10 +111,8 @@ def loss_factor(cycle: MeshCycle) -> Scalar:
     kinematics = cycle.kinematics
     contact = kinematics.path_of_contact
     # sliding over base-circle speed: v_g / v_tb = |s| (1 / r_b1 + 1 / r_b2)
-    sliding = jnp.abs(kinematics.contact_path) * (1 / contact.pinion_base_radius + 1 / contact.wheel_base_radius)
-    force = cycle.pair_force
-    if kinematics.helical:
-        force = slice_forces(cycle) / jnp.cos(kinematics.pair.pinion.base_helix_angle)
+    sliding = jnp.abs(kinematics.path) * (1 / contact.pinion_base_radius + 1 / contact.wheel_base_radius)
+    force = slice_forces(cycle) / jnp.cos(kinematics.pair.pinion.base_helix_angle)
     return safe_divide(jnp.sum(jnp.mean(force * sliding, axis=-1)), cycle.force)
 
 
@@ -311,9 +308,9 @@ def film_thickness(cycle: MeshCycle, lubricant: Lubricant) -> Load:
     """
     kinematics, (pinion, wheel) = cycle.kinematics, cycle.sides
     speed = _running(cycle)
-    speeds = kinematics.path_of_contact.rolling_speeds(kinematics.contact_path, speed)
-    rolling, pair = over_slices(speeds[0] + speeds[1]), kinematics.pair
-    radius = over_slices(_normal(pair, reduced_radius(pinion.contact_roll_length, wheel.contact_roll_length)))
+    speeds = kinematics.path_of_contact.rolling_speeds(kinematics.path, speed)
+    rolling, pair = speeds[0] + speeds[1], kinematics.pair
+    radius = _normal(pair, reduced_radius(pinion.contact_roll_length, wheel.contact_roll_length))
     modulus = 2 * combined_modulus(pair.pinion.material, pair.wheel.material, kinematics.plane)
     temperatures = bulk_temperature(cycle, lubricant), contact_temperature(cycle, lubricant)
     pressure = cycle.contact_pressure * jnp.sqrt(lubricant.load_factor)

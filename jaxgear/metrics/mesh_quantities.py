@@ -51,15 +51,9 @@ def mean_removed_material(cycle: MeshCycle) -> Scalar:
 
     Use it to choose the design with the least grinding among designs of equal transmission error.
     """
-    inside = cycle.kinematics.contact_outside <= 0
     # on the path of contact unmodified flanks have no gap: what is there is the modification
-    width = cycle.kinematics.slice_width
-    if cycle.kinematics.helical:
-        weight = jnp.where(inside, width[None, :, None], 0.0)
-        return jnp.sum(cycle.gap * weight) / jnp.sum(weight)
-    over_face = jnp.einsum("psn,s->pn", cycle.gap, width) / jnp.sum(width)
-    removed = jnp.where(inside, over_face, 0.0)
-    return jnp.sum(removed) / jnp.sum(inside.astype(removed.dtype))
+    weight = jnp.where(cycle.kinematics.outside <= 0, cycle.kinematics.slice_width[None, :, None], 0.0)
+    return jnp.sum(cycle.gap * weight) / jnp.sum(weight)
 
 
 def _of_pair(of: Any):

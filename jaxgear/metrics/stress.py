@@ -27,7 +27,7 @@ from ..geometry import Gear, GearPair, PathOfContact
 from ..geometry.gear import virtual_gear
 from ..geometry.involute import load_angle
 from ..geometry.outline import Curves, curves, rack_tip
-from ..numerics import Checked, bracketed_root, over_batch, over_slices, result, safe_sqrt
+from ..numerics import Checked, bracketed_root, over_batch, result, safe_sqrt
 from .load_distribution import face_load_factor, over_several_slices, root_face_load_factor
 
 Scalar = Float[Array, ""]
@@ -302,7 +302,7 @@ def root_stress(cycle: MeshCycle) -> RootStress:
     """
 
     def stress(side: Side) -> Load:
-        return cycle.line_load * over_slices(root_stress_per_load(side.gear, side.contact_roll_length))
+        return cycle.line_load * root_stress_per_load(side.gear, side.contact_roll_length)
 
     return RootStress(*(stress(side) for side in cycle.sides))
 

@@ -24,7 +24,6 @@ from .dense import pivots as pivots
 from .dense import positive_definite as positive_definite
 from .dense import pseudo_inverse as pseudo_inverse
 from .dense import solve_dense as solve_dense
-from .elimination import over_slices as over_slices
 from .fields import Checked as Checked
 from .fields import Number as Number
 from .fields import UnitKey as UnitKey

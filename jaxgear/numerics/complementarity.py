@@ -122,13 +122,13 @@ def _near(problem: ContactProblem) -> tuple[Rows, Curve]:
     One loop holds the laws of the springs once, though its first step takes the secants of the start.
     """
     shared = problem if problem.start_law is None else replace(problem, law=problem.start_law)
-    v, secant = _start(shared)
+    v, start = _start(shared)
 
     def advance(number, state):
         load = carried_by(state[0])
-        known, exact = number == 0, secants_under(problem, load)
+        exact = secants_under(problem, load)
         slope = slopes_under(problem, load, exact)
-        chosen = [[jnp.where(known, c, each) for c, each in zip(secant, of)] for of in (exact, slope)]
+        chosen = [[jnp.where(number == 0, c, each) for c, each in zip(start, of)] for of in (exact, slope)]
         return _newton(problem, state[0], *chosen)
 
     return jax.lax.fori_loop(0, _NEAR_STEPS, advance, (v, jnp.zeros_like(problem.gap[0, 0])))
@@ -137,30 +137,22 @@ def _near(problem: ContactProblem) -> tuple[Rows, Curve]:
 def _iterate(
     steps, tolerance, problem: ContactProblem, single: ContactProblem, common: Curve, v: Rows, approach: Curve
 ):
-    """Newton steps until the problem is solved everywhere.
+    """Newton steps until the problem is solved everywhere, each as a correction of what is left of the conditions.
 
-    The slopes come from the problem in single precision whatever the precision of the solution: a step then still gains
-    six digits, at half the cost. A step uses them twice, and two roundings of one slope would move its fixed point off
-    the solution by as much: slope per secant is a division, so it is stored and read twice.
+    With slopes in single precision a step still gains six digits, at half the cost; so it does where coupled slices are
+    eliminated in single precision. Others are eliminated quickly anyway.
     """
-    dtype = common.dtype
+    eliminated = problem if problem.coupling is None else single
 
     def evaluated(v, approach):
         load = carried_by(v)
         secant, left = secants_under(problem, load), opening(problem, load, approach)
-        residual = _residual(problem, load, approach, secant, left, common)
-        # coupled slices are corrected by what is left; others are cheaper to open once more than to keep
-        return v, approach, secant, None if problem.coupling is None else left, residual
+        return v, approach, secant, left, _residual(problem, load, approach, secant, left, common)
 
     def advance(state):
         count, (v, approach, secant, left, _) = state
-        load32, secant32 = _cast((carried_by(v), secant), jnp.float32)
-        if problem.coupling is not None:
-            slope32 = slopes_under(single, load32, secant32)
-            return count + 1, evaluated(*_corrected(problem, single, v, approach, secant, left, slope32))
-        share = [slope / c for slope, c in zip(slopes_under(single, load32, secant32), secant32)]
-        slope = [part * c for part, c in zip(_cast(share, dtype), secant)]
-        return count + 1, evaluated(*_newton(problem, v, secant, slope))
+        slope = slopes_under(single, *_cast((carried_by(v), secant), jnp.float32))
+        return count + 1, evaluated(*_corrected(problem, eliminated, v, approach, secant, left, slope))
 
     def unfinished(state):
         count, (*_, residual) = state
@@ -241,17 +233,26 @@ def _newton(problem: ContactProblem, v: Rows, secant: Slopes, slope: Slopes) -> 
 
 
 def _corrected(
-    problem: ContactProblem, single: ContactProblem, v: Rows, approach: Curve, secant: Slopes, left: Rows, slope: Slopes
+    problem: ContactProblem,
+    eliminated: ContactProblem,
+    v: Rows,
+    approach: Curve,
+    secant: Slopes,
+    left: Rows,
+    slope: Slopes,
 ) -> tuple[Rows, Curve]:
-    """One Newton step of coupled slices, as a correction of what is left of the conditions in single precision."""
+    """One Newton step as a correction of what is left of the conditions, in the precision of the problem to eliminate.
+
+    `secant`, `slope` and the `opening` that is left belong to the loads of v and the approach.
+    """
     active, carried = active_of(problem, v), carried_by(v)
     missing = None if problem.load is None else problem.load - total(problem, carried)
     still = None if problem.approach is None else jnp.zeros_like(approach)
-    given = [-(y + c * q) for y, c, q in zip(left, secant, carried)], left, missing, still
-    known, left, missing, still = _cast(given, jnp.float32)
-    factors = eliminate(single, active, slope)
-    found = respond(single, factors, known, load=missing, approach=still)
-    left = left_after(single, found, left)
+    known = [-(y + c * q) for y, c, q in zip(left, secant, carried)]
+    known, left, missing, still, slope = _cast((known, left, missing, still, slope), eliminated.gap.dtype)
+    factors = eliminate(eliminated, active, slope)
+    found = respond(eliminated, factors, known, load=missing, approach=still)
+    left = left_after(eliminated, found, left)
     added, more, left, per_slope = _cast((found.load, found.approach, left, factors.per_slope), approach.dtype)
     return [
         jnp.where(flag, q + x, -y * inverse) for flag, q, x, y, inverse in zip(active, carried, added, left, per_slope)

@@ -91,15 +91,10 @@ class ContactProblem(eqx.Module):
             raise ValueError("ContactProblem: one of load and approach must be given")
 
     @property
-    def relative_weight(self) -> Float[Array, " slices"]:
-        """Width of each slice over the mean of all."""
-        return self.weight / jnp.mean(self.weight)
-
-    @property
     def own_compliance(self) -> Float[Array, "springs #slices positions"]:
         """Deflection of every spring under an even load of its own."""
         own = jnp.stack([self.compliance[i, i] for i in range(len(self.compliance))])
-        return own if self.coupling is None else own + self.coupling.own(len(own))
+        return own if self.coupling is None else own + self.coupling.own(self.weight, len(own))
 
 
 class ContactSolution(eqx.Module):

@@ -1,14 +1,19 @@
 """The linear systems of a contact problem, with coupled slices or not, and what its loads deflect."""
 
+from functools import reduce
+from operator import add
 from typing import NamedTuple
 
 import equinox as eqx
 import jax.numpy as jnp
+from jaxtyping import Array, Float
 
 from .contact_problem import ContactProblem
 from .coupling import CoupledFactors, couple, pressed_by, stiffness, with_inverse
 from .elimination import Active, Curve, Inverse, Load, Rows, Slopes, inverse_of
 from .safe import unit
+
+Matrix = Float[Array, "springs springs #slices positions"]
 
 
 def eliminable(problem: ContactProblem) -> ContactProblem:
@@ -44,7 +49,7 @@ def eliminate(problem: ContactProblem, active: Active, slope: Slopes) -> Factors
     if problem.coupling is None:
         return Factors(inverse, per_slope, None)
     inverse = [[x / unit(x) for x in row] for row in inverse]  # read by several loops
-    return Factors(inverse, per_slope, couple(problem.coupling, problem.relative_weight, problem.lever, inverse))
+    return Factors(inverse, per_slope, couple(problem.coupling, problem.weight, problem.lever, inverse))
 
 
 class Response(NamedTuple):
@@ -76,22 +81,20 @@ def respond(
     if factors.coupled is None:
         rigid = _times(factors.inverse, list(problem.lever))
         if approach is None:
+            assert load is not None  # one of both is given
             approach = (load - total(problem, within)) / total(problem, rigid)
         pressed = [lever * approach[None] for lever in problem.lever]
         return Response([row + x * approach[None] for row, x in zip(within, rigid)], approach, pressed)
-    assert problem.coupling is not None
     kept = unit(factors.inverse[0][0])
     within = [row / kept for row in within]
-    mean = None if load is None else load / jnp.mean(problem.weight)
-    given = problem.coupling, problem.relative_weight, problem.lever, factors.coupled, within
-    pressed, approach = pressed_by(*given, load=mean, approach=approach)
+    pressed, approach = pressed_by(factors.coupled, within, load=load, approach=approach)
     pressed = [row / kept for row in pressed]
     added = _times(factors.inverse, pressed)
     return Response([row + more for row, more in zip(within, added)], approach, pressed)
 
 
-def _times(matrix: Inverse, rows: Rows) -> Rows:
-    return [sum(x * row for x, row in zip(each, rows)) for each in matrix]
+def _times(matrix: Inverse | Matrix, rows: Slopes) -> Rows:
+    return [reduce(add, [x * row for x, row in zip(each, rows)]) for each in matrix]
 
 
 def left_after(problem: ContactProblem, found: Response, before: Rows) -> Rows:
@@ -103,7 +106,7 @@ def left_after(problem: ContactProblem, found: Response, before: Rows) -> Rows:
 def load_per_approach(problem: ContactProblem, factors: Factors) -> Curve:
     """d load / d approach of the active springs."""
     if factors.coupled is not None:
-        return jnp.sum(problem.weight) * stiffness(factors.coupled)
+        return stiffness(factors.coupled)
     return total(problem, _times(factors.inverse, list(problem.lever)))
 
 
@@ -116,7 +119,7 @@ def without_gap(problem: ContactProblem, load: Rows, approach: Curve) -> Rows:
     """Part of `opening` that load and approach cause: deflection - lever d, without the initial gap."""
     deflected = _times(problem.compliance, load)
     if problem.coupling is not None:
-        further = problem.coupling.deflection(problem.relative_weight, problem.lever, load)
+        further = problem.coupling.deflection(problem.weight, problem.lever, load)
         deflected = [own + more for own, more in zip(deflected, further)]
     return [row - lever * approach[None] for row, lever in zip(deflected, problem.lever)]
 

@@ -7,7 +7,7 @@ all line loads is
             + lever[p, s] sum_{k, l, t} R[s, k] H[k, l] R[t, l] w[t] sum_j lever[j, t] q[j, t]:
 
 springs on bodies b whose deflection at one place is felt at others, on a support that deflects under the force of all
-springs of a slice; w is the width of a slice over the mean of all. There may be more places p on the bodies than
+springs of a slice; w is the width of a slice. There may be more places p on the bodies than
 springs in a slice: spring r then touches at one of the places r, r + springs, ..., and D is zero at the others.
 
 Every slice is eliminated on its own, as if nothing but its own compliance held it: A = own compliance + slope. With the
@@ -46,7 +46,7 @@ class Body(NamedTuple):
 
     Attributes:
         compliance: C, under a load that is the same in all slices.
-        share: M, symmetric and positive definite; the share of C that acts on the modes beyond `rest`.
+        share: M, symmetric and positive definite; the share of C that acts on the modes beyond `rest`, per width.
         rest: share of C that acts on every slice alone.
     """
 
@@ -59,12 +59,12 @@ class SliceCoupling(eqx.Module):
     """How slices are elastically coupled.
 
     Attributes:
-        modes: V, the constant first, with the weights w of the slices V^T w V = 1.
+        modes: V, the constant first; V^T w V is the mean of w over the slices.
         bodies: that the springs act on; K, the sum over all, is positive definite.
         scale: D, of loads and deflections at every place, where a body is stiffer at one than at another; zero where a
             spring touches elsewhere. None for one throughout.
         support_modes: R, orthonormal likewise, the constant first; None without a support.
-        support: H, symmetric and positive semi-definite, the deflection under line loads; None without a support.
+        support: H, symmetric and positive semi-definite, the deflection under loads; None without a support.
         inverse: of K, for eliminations, see `with_inverse`; None before.
     """
 
@@ -84,9 +84,9 @@ class SliceCoupling(eqx.Module):
         rows = [[jnp.sum(local[i::springs, j::springs], (0, 1)) for j in range(springs)] for i in range(springs)]
         return jnp.stack([jnp.stack(row) for row in rows])
 
-    def own(self, springs: int) -> Float[Array, "springs #slices positions"]:
+    def own(self, weight: Weight, springs: int) -> Float[Array, "springs #slices positions"]:
         """Deflection of every spring under an even load of its own, beyond that of the slices on their own."""
-        even = reduce(add, [body.share[0, 0] * body.compliance for body in self.bodies])
+        even = reduce(add, [jnp.mean(weight) * body.share[0, 0] * body.compliance for body in self.bodies])
         own = [even[i, i][None] for i in range(len(even))]
         return jnp.stack(own if self.scale is None else self.springs(list(self.scale * jnp.stack(own)), springs))
 
@@ -103,7 +103,7 @@ class SliceCoupling(eqx.Module):
 
     def deflection(self, weight: Weight, lever: Levers, load: Rows) -> Rows:
         """y under line loads, beyond that of the slices on their own."""
-        modal = stored(jnp.stack([onto(weight[:, None] * self.modes, row) for row in self.places(load)], axis=1))
+        modal = stored(onto(weight[:, None] * self.modes, jnp.stack(self.places(load))))
         pressed = [along(body.share, summed(body.compliance[None] * modal[:, None], 2)) for body in self.bodies]
         deflected = along(self.modes, stored(reduce(add, pressed)))
         result = self.springs([deflected[:, i] for i in range(deflected.shape[1])], len(load))
@@ -206,15 +206,19 @@ class _Block(NamedTuple):
 
 
 class CoupledFactors(NamedTuple):
-    """What couples the slices, eliminated.
+    """Elimination of the unknowns that couple the slices.
 
     Attributes:
+        coupling, weight, lever: as of `couple`.
         blocks: of the modal system.
         bent: L^-1 (D V)^T w A^-1 X by mode, and D^-1 times it.
         force: z under unit b, symmetric.
         yielding: b under unit H z, and under unit approach in its first column; see `_yielding`.
     """
 
+    coupling: SliceCoupling
+    weight: Weight
+    lever: Levers
     blocks: list[_Block]
     bent: tuple[list[Sides], list[Sides]]
     force: Float[Array, "bends bends positions"]
@@ -235,7 +239,7 @@ def couple(coupling: SliceCoupling, weight: Weight, lever: Levers, inverse: Inve
     right, force = _of_support(coupling, weight, lever, inverse, modal)
     bent = _ahead(blocks, right)
     force = force - _joined(bent[0], bent[1])
-    return CoupledFactors(blocks, bent, force, _yielding(coupling.support, force))
+    return CoupledFactors(coupling, weight, lever, blocks, bent, force, _yielding(coupling.support, force))
 
 
 def _products(
@@ -331,24 +335,17 @@ def _back(
 
 
 def pressed_by(
-    coupling: SliceCoupling,
-    weight: Weight,
-    lever: Levers,
-    factors: CoupledFactors,
-    within: Rows,
-    *,
-    load: Load | None = None,
-    approach: Curve | None = None,
+    factors: CoupledFactors, within: Rows, *, load: Load | None = None, approach: Curve | None = None
 ) -> tuple[Rows, Curve]:
-    """What presses the slices besides what is known, X b - D V m, and the approach.
+    """Deflections that the coupling adds to the known ones, X b - D V m, and the approach.
 
     Args:
-        coupling, weight, lever: as of `couple`.
-        factors: what that has found.
+        factors: from `couple`.
         within: A^-1 known.
-        load: total of w times the line loads to reach; None for the one of an `approach`.
+        load: total over the slices, of w and the levers times the line loads; None for that of an `approach`.
         approach: the approach; None for that of a `load`.
     """
+    coupling, weight, lever = factors.coupling, factors.weight, factors.lever
     placed = jnp.stack(coupling.places(within))
     loads = weight[:, None] * coupling.modes
     # mode by mode: compilers take a sum for all modes in every loop that reads one of them
@@ -356,7 +353,7 @@ def pressed_by(
     force = sum(height * row for height, row in zip(lever, within))
     shapes = _shapes(coupling)
     carried = onto(weight[:, None] * shapes, force) - _joined(factors.bent[0], divided)[:, 0]
-    bends, approach = _bends(coupling, factors, carried, load, approach)
+    bends, approach = _bends(factors, carried, load, approach)
     eliminated = [a[0] + summed(b * bends[:, None]) for a, b in zip(divided, factors.bent[1])]
     deflected = along(coupling.modes, jnp.stack(_back(factors.blocks, eliminated)))
     even = along(shapes, bends)
@@ -373,25 +370,23 @@ def _shapes(coupling: SliceCoupling) -> Float[Array, "slices bends"]:
 
 
 def stiffness(factors: CoupledFactors) -> Curve:
-    """Mean load of the slices per unit of approach."""
-    return summed(factors.force[0] * factors.yielding[:, 0])
+    """Load per unit of approach."""
+    return len(factors.coupling.modes) * summed(factors.force[0] * factors.yielding[:, 0])
 
 
-def _bends(
-    coupling: SliceCoupling, factors: CoupledFactors, carried: Bends, total, approach: Curve | None
-) -> tuple[Bends, Curve]:
+def _bends(factors: CoupledFactors, carried: Bends, total, approach: Curve | None) -> tuple[Bends, Curve]:
     """b and the approach, for that or for a total of the line loads; `carried` is z at b = 0."""
-    root = len(coupling.modes) ** 0.5
-    still, rise = _still(coupling, factors, carried), factors.yielding[:, 0]
+    root = len(factors.coupling.modes) ** 0.5
+    still, rise = _still(factors, carried), factors.yielding[:, 0]
     if approach is None:
         missing = total / root - carried[0] - summed(factors.force[0] * still)
         approach = missing / (root * summed(factors.force[0] * rise))
     return still + root * approach[None] * rise, approach
 
 
-def _still(coupling: SliceCoupling, factors: CoupledFactors, carried: Bends) -> Bends:
+def _still(factors: CoupledFactors, carried: Bends) -> Bends:
     """b without approach: (1 + H force) b = -H carried."""
-    support = coupling.support
+    support = factors.coupling.support
     if support is None:
         return jnp.zeros_like(carried)
     bent = jnp.tensordot(support, carried, 1)

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 import jax.numpy as jnp
-from jaxtyping import Array, Bool, Float, Shaped
+from jaxtyping import Array, Bool, Float
 
 from .safe import unit
 
@@ -13,11 +13,6 @@ Curve = Float[Array, " positions"]
 Active = Sequence[Bool[Array, "slices positions"]]
 Load = Float[Array, ""] | Curve  # a scalar where it is the same everywhere
 Inverse = list[Rows]  # of a matrix of every slice, by springs
-
-
-def over_slices(field: Shaped[Array, "pairs *slices positions"]) -> Shaped[Array, "pairs #slices positions"]:
-    """A field of springs with an axis of slices, of length one where it is the same in all of them."""
-    return field if field.ndim == 3 else field[:, None]
 
 
 def inverse_of(

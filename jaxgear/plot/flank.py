@@ -14,7 +14,6 @@ from matplotlib.ticker import MaxNLocator
 from ..contact import Mesh, MeshCycle, Side
 from ..metrics import flank_surface, removed_at
 from ..microgeometry import AbstractModification, NoModification
-from ..numerics import over_slices
 from ..tolerance import ToleranceClass, helix_trace, profile_trace
 from .figure import (
     ABOVE,
@@ -436,12 +435,12 @@ def face_gap(cycle: MeshCycle, mesh: Mesh, ax: Axes | None = None, *, position: 
     pair = int(np.asarray(cycle.pair_force)[:, where].argmax())
     unloaded, opening = (np.asarray(of)[pair, :, where] for of in (mesh.held(cycle.gap), cycle.opening))
     if cycle.kinematics.helical:
-        beyond = np.asarray(cycle.kinematics.contact_outside)[pair, :, where] > 0
+        beyond = np.asarray(cycle.kinematics.outside)[pair, :, where] > 0
         unloaded, opening = np.where(beyond, np.nan, unloaded), np.where(beyond, np.nan, opening)
     face = np.asarray(cycle.kinematics.face_coordinate)
     curves = {"unloaded": unloaded}
     if mesh.support is not None:
-        lever = over_slices(mesh.lever)
+        lever = mesh.lever
         force = np.asarray(cycle.line_load * lever * mesh.slice_width[:, None])[:, :, where].sum(axis=0)
         bent = np.asarray(mesh.support.influence(mesh.face_coordinate)) @ force
         if bent.any():

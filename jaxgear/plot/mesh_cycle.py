@@ -19,10 +19,10 @@ PHASE_LABEL = "mesh phase [base pitches]"
 def middle_path(cycle: MeshCycle) -> np.ndarray:
     """Path position of every pair in the middle of the face [mm], shape (pairs, positions)."""
     kinematics = cycle.kinematics
-    path = np.asarray(kinematics.contact_path)
+    path = np.asarray(kinematics.path)[:, 0]
     if not kinematics.helical:
         return path
-    return path[:, 0] - float(kinematics.face_coordinate[0] * kinematics.pair.path_slope)
+    return path - float(kinematics.face_coordinate[0] * kinematics.pair.path_slope)
 
 
 def path_label(cycles: Iterable[MeshCycle]) -> str:

@@ -13,7 +13,7 @@ from ..geometry import GearPair, tooth_thickness
 from ..io.folder import writing
 from ..metrics import flash_temperature
 from ..microgeometry import AbstractModification
-from ..numerics import check, over_slices
+from ..numerics import check
 from ..numerics.durable import write_durably
 from .flanks import write_modification
 from .forms import content_of
@@ -164,9 +164,9 @@ def _write_results(
 
     def everywhere(field) -> np.ndarray:
         """Values of every contact; the slices of spur gears share them."""
-        return np.broadcast_to(np.asarray(over_slices(field)), shape)
+        return np.broadcast_to(np.asarray(field), shape)
 
-    places = np.nonzero(everywhere(kinematics.contact_outside) == 0)
+    places = np.nonzero(everywhere(kinematics.outside) == 0)
     order = np.lexsort((everywhere(side.contact_roll_length)[places], places[1]))
     places = tuple(axis[order] for axis in places)
     roll = everywhere(side.contact_roll_length)[places]
@@ -191,7 +191,7 @@ def _write_results(
         "local_hertzian_contact_stress": (np.asarray(cycle.contact_pressure)[places], "MPa"),
     }
     if speed is not None:
-        path = everywhere(kinematics.contact_path)[places]
+        path = everywhere(kinematics.path)[places]
         known = {} if friction is None else {"friction": friction}
         flash = flash_temperature(cycle, speed, **known)
         found["local_sliding_velocity"] = (np.asarray(kinematics.path_of_contact.sliding_speed(path, speed)), "m / s")

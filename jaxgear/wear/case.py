@@ -27,7 +27,7 @@ from ..geometry import GearPair
 from ..geometry.involute import half_tooth_angle
 from ..metrics.lubrication import flash_temperature
 from ..microgeometry import AbstractModification, Flank, TabulatedFlank, TabulatedProfile
-from ..numerics import Numbers, check, kernel, over_slices, program, real, result, whole
+from ..numerics import Numbers, check, kernel, program, real, result, whole
 from .march import Depth, March, WearRate, march
 from .vibration import Flanks, LineLoad, Vibration, vibration_of
 from .worn_volume import PARTS, Deposit, deposit, grid, worn
@@ -113,12 +113,12 @@ class OfLubrication(eqx.Module):
         assert speed is not None  # `wear_law` has asked for it
         friction = {} if cycle.operating_point.friction is None else {"friction": cycle.operating_point.friction}
         contact = kinematics.path_of_contact
-        sliding = contact.sliding_speed(jnp.clip(kinematics.contact_path, contact.start, contact.end), speed)
+        sliding = contact.sliding_speed(jnp.clip(kinematics.path, contact.start, contact.end), speed)
         pressure = cycle.contact_pressure + cycle.corner_pressure
         shape = cycle.line_load.shape
         given = (
             pressure,
-            jnp.broadcast_to(over_slices(jnp.abs(sliding)), shape),
+            jnp.broadcast_to(jnp.abs(sliding), shape),
             flash_temperature(cycle, speed, **friction),
         )
         # without load nothing wears, and the slope of a power of no pressure may be infinite

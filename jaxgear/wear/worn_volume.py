@@ -44,7 +44,7 @@ from ..contact import Mesh, MeshCycle
 from ..contact.contact_width import contact_nodes, full_load, place_of
 from ..contact.kinematics import contacts
 from ..geometry import PathOfContact
-from ..numerics import Given, Numbers, check, over_slices, program, real, safe_divide, safe_sqrt
+from ..numerics import Given, Numbers, check, program, real, safe_divide, safe_sqrt
 
 Scalar = Float[Array, ""]
 Load = Float[Array, "pairs slices positions"]
@@ -131,7 +131,7 @@ def arcs(roll_length: Float[Array, " points"], base_radius: Scalar) -> Float[Arr
 @program
 def deposit(mesh: Mesh, torque: Scalar, points: int) -> Deposit:
     """Mapping of worn volume for a mesh under a torque on the pinion [N m], which sets the contact widths."""
-    contact, path, dtype = mesh.path_of_contact, over_slices(mesh.kinematics.contact_path), mesh.slice_width.dtype
+    contact, path, dtype = mesh.path_of_contact, mesh.kinematics.path, mesh.slice_width.dtype
     step = contact.base_pitch / mesh.resolution.positions
 
     def along(places: np.ndarray) -> Array:
@@ -237,7 +237,7 @@ def passage_depth(cycle: MeshCycle, coefficient: Numbers) -> tuple[Load, Load]:
     coefficient = real(coefficient).astype(cycle.line_load.dtype)
     check("coefficient", coefficient, "m2/N", low=0.0)
     moving = cycle.kinematics
-    pinion, wheel = map(over_slices, specific_sliding(moving.path_of_contact, moving.contact_path))
+    pinion, wheel = specific_sliding(moving.path_of_contact, moving.path)
     worn = UM_PER_LOAD * coefficient * cycle.line_load / jnp.cos(moving.pair.pinion.base_helix_angle)
     return worn * pinion, worn * wheel
 
