@@ -150,7 +150,7 @@ SECOND = Quantity(
 @pytest.fixture
 def known(monkeypatch):
     """The vocabulary with a quantity more, until the end of the test."""
-    monkeypatch.setattr(quantities, "_known", dict(quantities._known))
+    monkeypatch.setattr(quantities, "_here", dict(quantities._known))
     quantities.add(SECOND)
 
 
@@ -194,7 +194,7 @@ def traced(monkeypatch):
         seen.append(microphone)
         return jg.peak_to_peak(analysis.cycle.transmission_error) / microphone.distance
 
-    monkeypatch.setattr(quantities, "_known", dict(quantities._known))
+    monkeypatch.setattr(quantities, "_here", dict(quantities._known))
     quantities.add(Quantity("level", level, "um/m", takes=Microphone, label="sound level"))
     return seen
 
