@@ -172,6 +172,7 @@ def test_numerics_has_no_gear_word():
 
 # public functions and methods that do not say the type of every parameter and of their result, and why
 OF_ANY_TYPE = {
+    "cli/new.py new": "passes options of another function on",
     "contact/status.py WithStatus.converged": "of the kind of array that the status is, of JAX or NumPy",
     "contact/solve.py contact_of": "takes forces or approaches, each of a type of its own",
     "dynamics/runs.py design_runs": "designs are a tree of arrays of any kind, options those of another function",
@@ -251,7 +252,6 @@ TORQUE_BY_KEYWORD = {
     "io/write_design.py write_design": "likewise: a file may do without most of them",
     "io/write_design.py write_starter": "likewise",
     "rexs/write.py write_rexs": "likewise",
-    "cli/new.py new": "an option of the command",
     "rexs/convert.py convert": "likewise",
 }
 

@@ -54,7 +54,7 @@ class Search:
     def __init__(self, monkeypatch, height):
         self.height = height
         monkeypatch.setattr(identification, "identify", self)
-        monkeypatch.setattr("jaxgear.studies.results.gears", lambda design: {})  # which other tests compile
+        monkeypatch.setattr("jaxgear.studies.summary.gears", lambda design: {})  # which other tests compile
         monkeypatch.setattr(DesignFile, "mesh", lambda self, size: kinematics(self.pair(), real(0.0), size, "strain"))
 
     def __call__(self, mesh, measurement, design, prior, **asked):

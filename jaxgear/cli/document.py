@@ -14,7 +14,7 @@ from ..io.toml import content
 from ..report import Chapter, Table, heading, needed, numbers, picture, write_report
 from ..studies import AbstractStudy, AbstractStudyResult
 from ..studies.gear_data import gear_tables, gears
-from ..studies.summary_data import versions
+from ..studies.summary import versions
 
 REPORT = "report.html"
 _NOTHING = "-"

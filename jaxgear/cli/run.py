@@ -15,8 +15,8 @@ import jax
 from ..io import DesignFile, load_design, result_folder
 from ..numerics import compile_quickly
 from ..studies import AbstractStudy, Checkpoints, Progress
-from ..studies.results import save_figures, write_study_summary
 from ..studies.study import AbstractStudyResult
+from ..studies.summary import save_figures, write_study_summary
 from . import interrupt, streams, terminal
 from .cache import enable_cache
 from .document import document

@@ -66,7 +66,7 @@ class Measurement(Checked):
         Raises:
             ValueError: if no noise is given and repeated readings are too few or all equal.
         """
-        return noise_of(self, bins_of(self, resolution.positions, float(np.asarray(resolution.first_phase)), period))
+        return _noise_of(self, _bins_of(self, resolution.positions, float(np.asarray(resolution.first_phase)), period))
 
 
 class Bins(NamedTuple):
@@ -91,7 +91,7 @@ class Bins(NamedTuple):
         return jnp.zeros(len(self.level), of.dtype).at[self.row].add(of) / self.readings.astype(of.dtype)
 
 
-def bins_of(measurement: Measurement, positions: int, first: float, period: int = 1) -> Bins:
+def _bins_of(measurement: Measurement, positions: int, first: float, period: int = 1) -> Bins:
     """Readings joined; those as many base pitches apart as the period count as one position."""
     phase, torque = np.asarray(measurement.phase, float), np.asarray(measurement.torque, float)
     torques, level = np.unique(torque, return_inverse=True)
@@ -103,7 +103,7 @@ def bins_of(measurement: Measurement, positions: int, first: float, period: int 
     return Bins(torques, kept // count, np.bincount(row, place) / readings, row, readings)
 
 
-def noise_of(measurement: Measurement, bins: Bins) -> Scalar:
+def _noise_of(measurement: Measurement, bins: Bins) -> Scalar:
     """Standard deviation of a reading [um], see `Measurement.noise_on`."""
     if measurement.noise is not None:
         return measurement.noise
@@ -146,13 +146,13 @@ class Data(eqx.Module):
 def joined(measurement: Measurement, mesh: Mesh, period: int) -> tuple[Data, np.ndarray]:
     """Means of the readings of one torque within one position of the mesh, and the windows that they need."""
     positions, first = mesh.resolution.positions, float(np.asarray(mesh.phase)[0])
-    bins = bins_of(measurement, positions, first, period)
+    bins = _bins_of(measurement, positions, first, period)
     before = np.floor(bins.place).astype(int)
     places = np.stack([before, before + 1]) % (period * positions)
     windows, number = np.unique(places // positions, return_inverse=True)
     places = number.reshape(places.shape) * positions + places % positions
     dtype = mesh.slice_width.dtype
-    noise = noise_of(measurement, bins).astype(dtype)
+    noise = _noise_of(measurement, bins).astype(dtype)
     data = Data(
         torques=jnp.asarray(bins.torques, dtype),
         level=jnp.asarray(bins.level),

@@ -25,7 +25,7 @@ from ..studies.checkpoints import Checkpoints
 from ..studies.evaluation import coarse
 from ..studies.progress import Stages
 from ..studies.study import AbstractStudy, AbstractStudyResult
-from ..studies.summary_data import flanks_data
+from ..studies.summary import flanks_data
 from ..tolerance import ToleranceClass
 from .estimate import Identified, identify, period_of
 from .measured_te import read_measurement

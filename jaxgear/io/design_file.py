@@ -133,7 +133,7 @@ class FileDesign(eqx.Module):
         return build(self.pinion, parameters), build(self.wheel, parameters)
 
 
-class MeshParts(NamedTuple):
+class _MeshParts(NamedTuple):
     """Inputs of a prepared mesh.
 
     Attributes:
@@ -147,7 +147,7 @@ class MeshParts(NamedTuple):
     support: RigidSupport | None
 
 
-class FileMesh(eqx.Module):
+class _FileMesh(eqx.Module):
     """The prepared mesh of a design file as a function of its free parameters; pure and traceable."""
 
     pair: Part
@@ -160,11 +160,11 @@ class FileMesh(eqx.Module):
         """Every open number."""
         return [*self.pair.free(), *self.model.free(), *self.misalignment.free()]
 
-    def parts(self, parameters: Mapping[str, Any]) -> MeshParts:
+    def parts(self, parameters: Mapping[str, Any]) -> _MeshParts:
         """Gear pair, stiffness model and misaligned axes of the mesh."""
         pair, compliance = self.pair.build(parameters), self.model.build(parameters)
         axes = RigidSupport(pair, self.misalignment.build(parameters)) if self.misalignment.fields else None
-        return MeshParts(pair, compliance, axes)
+        return _MeshParts(pair, compliance, axes)
 
     def __call__(self, parameters: Mapping[str, Any]) -> Mesh:
         """The mesh."""
@@ -216,8 +216,8 @@ class DesignFile:
     support: ShaftSupport | None
     tables: dict[str, Any]
     _load: Part
-    _mesh: FileMesh
-    _middle: MeshParts
+    _mesh: _FileMesh
+    _middle: _MeshParts
     _longest: GearPair
 
     def needed(self, name: str, why: str) -> Any:
@@ -476,7 +476,7 @@ def _read(file: Path, says: dict[str, Any]) -> tuple[DesignFile, list[FurtherTab
         top.refuse(["meshes", "housing"], " without [[shafts]]")
     sizes = resolution_of(top.resolution, uneven, bent=support is not None and len(top.meshes) < 2, longest=longest)
     model = with_tables(model, top.model, folder, pair, usual_pair)  # last, as it takes longer than all the rest
-    mesh = FileMesh(pair, model, axes, sizes, coast)
+    mesh = _FileMesh(pair, model, axes, sizes, coast)
     classes = tables["tolerance"].quality_class if "tolerance" in tables else quality
     low, high = load.torque_range or [share * torque for share in _TORQUE_RANGE]
     design = DesignFile(

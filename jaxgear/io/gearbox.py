@@ -44,7 +44,7 @@ def _several(cls: type[Any], *, empty: bool = True) -> Kind:
     return list_of(nested(cls, open=False), empty=empty)
 
 
-class MountedGearSection(section_of(MountedGear, ("name", "gear"), open=False)):  # type: ignore[misc]
+class _MountedGearSection(section_of(MountedGear, ("name", "gear"), open=False)):  # type: ignore[misc]
     """A gear on a shaft.
 
     Attributes:
@@ -75,7 +75,7 @@ class ShaftSection(FileTable):
     name: str = entry(text(), ...)
     sections: list[Part] = entry(_several(ShaftPart, empty=False), ...)
     bearings: list[Part] = entry(list_of(Kind("a table", _bearing)), ...)
-    gears: list[MountedGearSection] = entry(list_of(nested(MountedGearSection), empty=True), [])
+    gears: list[_MountedGearSection] = entry(list_of(nested(_MountedGearSection), empty=True), [])
     couplings: list[Part] = entry(_several(Coupling), [])
     loads: list[Part] = entry(_several(ShaftLoad), [])
     material: str | Part | None = entry(MATERIAL)
@@ -229,7 +229,7 @@ def _shaft(section: ShaftSection, pair: GearPair, materials: Materials) -> Shaft
     return refused(section.key, Shaft, section.name, sections, bearings, gears, couplings, loads, material)
 
 
-def _gear(section: MountedGearSection, pair: GearPair, materials: Materials, of_shaft: Material) -> MountedGear:
+def _gear(section: _MountedGearSection, pair: GearPair, materials: Materials, of_shaft: Material) -> MountedGear:
     key = section.key
     if section.name in _OWN:
         if section.gear is not None:
@@ -275,7 +275,7 @@ TABLES: Mapping[str, type[FileTable]] = {
     "[[shafts.sections]]": section_of(ShaftPart, open=False),
     "[[shafts.bearings]]": section_of(Bearing, open=False),
     "[[shafts.bearings]] with stiffness": section_of(MatrixBearing, open=False),
-    "[[shafts.gears]]": MountedGearSection,
+    "[[shafts.gears]]": _MountedGearSection,
     "[[shafts.couplings]]": section_of(Coupling, open=False),
     "[[shafts.loads]]": section_of(ShaftLoad, open=False),
     "[[meshes]]": MeshSection,

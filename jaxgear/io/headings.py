@@ -47,7 +47,7 @@ class Column:
         return self.name.rpartition("_")[2]
 
 
-def known_unit(text: str) -> str:
+def _known_unit(text: str) -> str:
     """The unit of a text, "" for none."""
     plain = re.sub(r"\s", "", text)
     found = _SPELLINGS.get(plain.lower(), plain)
@@ -57,7 +57,7 @@ def known_unit(text: str) -> str:
 def with_units(names: list[str], cells: Iterable[str]) -> list[str] | None:
     """Headings with the units of the line below them; None where that line is not one of units."""
     texts = [cell.strip().strip("[]()") for cell in cells]
-    if len(texts) != len(names) or not any(texts) or not all(known_unit(text) for text in texts if text):
+    if len(texts) != len(names) or not any(texts) or not all(_known_unit(text) for text in texts if text):
         return None
     return [f"{name} [{text}]" if text else name for name, text in zip(names, texts)]
 
@@ -99,9 +99,9 @@ def parts(heading: str) -> tuple[str, str]:
     """Quantity of a heading, in lower case with underscores, and its unit, "" without one."""
     match = _UNIT.fullmatch(heading)
     name, unit = (match["name"], match["unit"]) if match else (heading, "")
-    if not match and known_unit(heading.rpartition("_")[2]):
+    if not match and _known_unit(heading.rpartition("_")[2]):
         name, _, unit = heading.rpartition("_")
-    return re.sub(r"\W+", "_", name.strip().lower()).strip("_"), known_unit(unit) or unit.strip()
+    return re.sub(r"\W+", "_", name.strip().lower()).strip("_"), _known_unit(unit) or unit.strip()
 
 
 def _factor(heading: str, unit: str, wanted: str) -> float:

@@ -55,7 +55,7 @@ CURVE = "cubic"  # on which flanks without parameters are projected
 PARETO = "pareto"
 
 
-class ConstraintSection(FileTable):
+class _ConstraintSection(FileTable):
     """A limit, of either a quantity or a linear combination of variables.
 
     Attributes:
@@ -71,7 +71,7 @@ class ConstraintSection(FileTable):
     high: float | None = entry(real(plausible=False))
 
 
-class FactorialOptions(FileTable):
+class _FactorialOptions(FileTable):
     source = METHODS["factorial"]
 
     levels: int | dict[str, int] | None = entry(
@@ -93,7 +93,7 @@ class _Projected(FileTable):
     curve: str | None = entry(text())
 
 
-class IterationOptions(_Projected, _ITERATION):  # type: ignore[misc, valid-type]
+class _IterationOptions(_Projected, _ITERATION):  # type: ignore[misc, valid-type]
     """Levels the transmission error by removing it from the flanks.
 
     Attributes:
@@ -102,7 +102,7 @@ class IterationOptions(_Projected, _ITERATION):  # type: ignore[misc, valid-type
     """
 
 
-class FreeFormOptions(_Projected, _FREE_FORM):  # type: ignore[misc, valid-type]
+class _FreeFormOptions(_Projected, _FREE_FORM):  # type: ignore[misc, valid-type]
     """Finds the flanks with the least PPTE, of any form, by sequential linear programming."""
 
 
@@ -110,12 +110,12 @@ def method_options() -> dict[str, type[FileTable]]:
     """The tables [optimize.<method>] of the methods that have one, of a user's own too: the fields of their classes."""
     shared = "starts", "steps", "seed"
     found = {name: section_of(cls, shared, open=False) for name, cls in METHODS.items() if cls.takes_variables}
-    found |= {"factorial": FactorialOptions, PARETO: section_of(Pareto)}
-    found |= {"te_iteration": IterationOptions, "free_form": FreeFormOptions}
+    found |= {"factorial": _FactorialOptions, PARETO: section_of(Pareto)}
+    found |= {"te_iteration": _IterationOptions, "free_form": _FreeFormOptions}
     return {name: section for name, section in found.items() if section.keys}
 
 
-class RoundingSection(FileTable):
+class _RoundingSection(FileTable):
     """Steps in which the result is wanted, such as a shop can make; 0 for all digits.
 
     Attributes:
@@ -164,8 +164,8 @@ class OptimizeSection(FurtherTable):
     steps: int | None = entry(count(10, 100_000))
     application_factor: float = entry(real(Number(low=0.0, high=100.0, open_low=True)), 1.0)
     verify: bool | None = entry(switch())
-    rounding: RoundingSection | None = entry(nested(RoundingSection))
-    constraint: list[ConstraintSection] = entry(list_of(nested(ConstraintSection), empty=True), [])
+    rounding: _RoundingSection | None = entry(nested(_RoundingSection))
+    constraint: list[_ConstraintSection] = entry(list_of(nested(_ConstraintSection), empty=True), [])
 
     @classmethod
     def every_key(cls) -> dict[str, Kind]:
@@ -202,7 +202,7 @@ class OptimizeSection(FurtherTable):
     def inner(cls) -> dict[str, type[FileTable]]:
         """Constraints, rounding, and options of the methods."""
         options = {f"[optimize.{name}]": section for name, section in method_options().items()}
-        return {"[[optimize.constraint]]": ConstraintSection, "[optimize.rounding]": RoundingSection, **options}
+        return {"[[optimize.constraint]]": _ConstraintSection, "[optimize.rounding]": _RoundingSection, **options}
 
 
 def optimize_of(design: DesignFile) -> OptimizeSection:
@@ -423,7 +423,7 @@ def _constraints(design: DesignFile, section: OptimizeSection) -> tuple[Constrai
     return tuple(_constraint(design, each) for each in section.constraint)
 
 
-def _constraint(design: DesignFile, section: ConstraintSection) -> Constraint:
+def _constraint(design: DesignFile, section: _ConstraintSection) -> Constraint:
     key = section.key
     of: Any = section.variables if section.of is None else section.of
     unit = ""
@@ -449,7 +449,7 @@ _STEPS = {"um": "amount", "mm": "length"}  # keys of [optimize.rounding] by the 
 
 def _rounding(design: DesignFile, section: OptimizeSection) -> dict[str, float]:
     """Steps of the variables; a default without a multiple within the bounds gives way."""
-    asked = section.rounding or RoundingSection("optimize.rounding")
+    asked = section.rounding or _RoundingSection("optimize.rounding")
     steps: dict[str, float] = {}
     for name, key in ((name, _STEPS[unit]) for name, unit in design.units.items() if unit in _STEPS):
         step = getattr(asked, key)

@@ -37,7 +37,7 @@ _LISTS = "pitch", "single_pitch", "profile_slope", "helix_slope"  # keys, and co
 _SLOPES = {"profile_slope": ProfileSlope, "helix_slope": LeadSlope}
 
 
-class GearTeethSection(FileTable):
+class _GearTeethSection(FileTable):
     """How the teeth of one gear deviate; what is given in several ways adds up.
 
     Teeth are counted in the order in which they come into mesh, from 0. Amounts are positive where material is missing:
@@ -83,8 +83,8 @@ class TeethSection(FurtherTable):
     table = "teeth"
     drive_only = True
 
-    pinion: GearTeethSection | None = entry(nested(GearTeethSection))
-    wheel: GearTeethSection | None = entry(nested(GearTeethSection))
+    pinion: _GearTeethSection | None = entry(nested(_GearTeethSection))
+    wheel: _GearTeethSection | None = entry(nested(_GearTeethSection))
     over: str | int | None = entry(_OVER)
 
     def check(self, design: DesignFile) -> None:
@@ -106,7 +106,7 @@ class TeethSection(FurtherTable):
     def inner(cls) -> Mapping[str, type[FileTable]]:
         """The gears, and waves around them."""
         return {
-            "[teeth.pinion] and [teeth.wheel]": GearTeethSection,
+            "[teeth.pinion] and [teeth.wheel]": _GearTeethSection,
             "[[teeth.pinion.undulations]]": section_of(Undulation, open=False),
         }
 
@@ -132,7 +132,7 @@ def teeth_of(design: DesignFile) -> Teeth:
         return teeth
 
 
-def _deviations(design: DesignFile, name: str, section: GearTeethSection | None) -> TeethDeviations | None:
+def _deviations(design: DesignFile, name: str, section: _GearTeethSection | None) -> TeethDeviations | None:
     """Deviations of the teeth of one gear; None without its table."""
     if section is None:
         return None
@@ -163,7 +163,7 @@ def _deviations(design: DesignFile, name: str, section: GearTeethSection | None)
     return TeethDeviations(pitch, made, tuple(waves))
 
 
-def _lists(design: DesignFile, section: GearTeethSection) -> dict[str, Any]:
+def _lists(design: DesignFile, section: _GearTeethSection) -> dict[str, Any]:
     """The numbers of every tooth by their keys, those of the file included."""
     found = {key: getattr(section, key) for key in _LISTS if getattr(section, key) is not None}
     if section.file is None:
@@ -186,7 +186,7 @@ def _lists(design: DesignFile, section: GearTeethSection) -> dict[str, Any]:
         return found | read
 
 
-def _measured(design: DesignFile, name: str, section: GearTeethSection) -> AbstractModification:
+def _measured(design: DesignFile, name: str, section: _GearTeethSection) -> AbstractModification:
     """A flank of every tooth from a file."""
     assert section.flanks is not None
     pair, key = design.pair(), join(section.key, "flanks")
@@ -210,7 +210,7 @@ def _measured(design: DesignFile, name: str, section: GearTeethSection) -> Abstr
 
 
 def _check_slices(
-    design: DesignFile, section: GearTeethSection, flanks: AbstractModification | None, lists: Mapping[str, Any]
+    design: DesignFile, section: _GearTeethSection, flanks: AbstractModification | None, lists: Mapping[str, Any]
 ) -> None:
     """Refuses what varies over the face on one slice, which cannot show it."""
     if flanks is None or design.resolution().slices > 1:

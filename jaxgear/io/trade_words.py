@@ -33,13 +33,13 @@ def unknown_key(name: str, keys: Set[str]) -> str:
         return f'unknown key, did you mean "{same}"' + (", in modules?" if same in _COEFFICIENTS else "?")
     if plain in _ADVICE and not keys.isdisjoint(_TABLES):
         return f"unknown key, {_ADVICE[plain]}"
-    near = [key for key in difflib.get_close_matches(name, keys, n=3, cutoff=0.5) if is_misspelt(name, key)]
+    near = [key for key in difflib.get_close_matches(name, keys, n=3, cutoff=0.5) if _is_misspelt(name, key)]
     if near:
         return f'unknown key, did you mean "{near[0]}"?'
     return f"unknown key, must be one of {', '.join(sorted(keys))}" if keys else "unknown key, nothing is allowed here"
 
 
-def is_misspelt(name: str, key: str) -> bool:
+def _is_misspelt(name: str, key: str) -> bool:
     """True if every part of a name is near its counterpart in the key, or the whole is but for underscores."""
     parts, wanted = name.lower().split("_"), key.split("_")
     if len(parts) != len(wanted):

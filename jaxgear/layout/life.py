@@ -118,7 +118,7 @@ def under_loads(support: AbstractSupport, torques: Torques, stations: int) -> St
     return jax.vmap(lambda torque: at_stations(support, torque, stations=stations))(torques)
 
 
-def face_loads(faces: Stations, pinion: FlankLine, wheel: FlankLine) -> FaceLoad:
+def _face_loads(faces: Stations, pinion: FlankLine, wheel: FlankLine) -> FaceLoad:
     """Load over the face of every support, with a leading axis."""
 
     def at(face):
@@ -132,7 +132,7 @@ def face_loads(faces: Stations, pinion: FlankLine, wheel: FlankLine) -> FaceLoad
 @program
 def damage_of(faces: Stations, load: LoadSpectrum, strength: Strength, pinion: FlankLine, wheel: FlankLine) -> Damage:
     """`damage` of supports that are worked out."""
-    found = face_loads(faces, pinion, wheel)
+    found = _face_loads(faces, pinion, wheel)
     pair = jax.tree.map(lambda leaf: leaf[0], faces.pair)
     loaded = Loaded(maximum(found.line_load, axis=-1), face_load_factor(found.line_load), found.status)
     return summed(pair, loaded, load, strength)
@@ -289,7 +289,7 @@ def _soft_damage(faces: Stations, load: LoadSpectrum, strength, at: Float[Array,
     pair = jax.tree.map(lambda leaf: leaf[0], faces.pair)
 
     def of(at) -> Float[Array, ""]:
-        found = face_loads(faces, FlankLine(), FlankLine(at[0], at[1]).on(pair, "wheel"))
+        found = _face_loads(faces, FlankLine(), FlankLine(at[0], at[1]).on(pair, "wheel"))
         mean = jnp.mean(found.line_load, axis=-1)
         loaded = mean > 0
         share = found.line_load / jnp.where(loaded, mean, 1.0)[:, None]
@@ -329,4 +329,4 @@ def face_load_over_torques(
 
 @program
 def _factors(faces: Stations, pinion: FlankLine, wheel: FlankLine) -> Float[Array, " torques"]:
-    return face_load_factor(face_loads(faces, pinion, wheel).line_load)
+    return face_load_factor(_face_loads(faces, pinion, wheel).line_load)

@@ -19,7 +19,7 @@ from ..shafts import ShaftSupport, bearing_reactions, root_face_load_factor, too
 from ..studies import AbstractStudyResult
 from ..studies.evaluation import grid_lines
 from ..studies.side_by_side import finding_lines
-from ..studies.summary_data import finding_data, flanks_data
+from ..studies.summary import finding_data, flanks_data
 from ..sweeps.columns import described
 from .cases import CASES, FlankLineTolerance, ToleranceCases
 from .flank_line import FlankLine
@@ -355,7 +355,7 @@ def flank_lines(layout: FlankLineLayout) -> dict[str, tuple[FlankLine, FlankLine
     return dict(zip(STEPS, ((none, none), first, (layout.pinion, layout.wheel))))
 
 
-def root_factor(layout: FlankLineLayout, factor: Given) -> np.ndarray:
+def _root_factor(layout: FlankLineLayout, factor: Given) -> np.ndarray:
     """K_Fbeta from K_Hbeta for the gears of a layout."""
     pair = layout.pair
     return np.asarray(root_face_load_factor(np.maximum(factor, 1.0), pair.face_width, tooth_height(pair)))
@@ -372,7 +372,7 @@ def _layout(layout: FlankLineLayout) -> dict[str, Any]:
             name: {
                 **({hours: layout.lives[name][step]} if layout.lives else {}),
                 "face_load_factor": one.face_load_factor,
-                "root_face_load_factor": root_factor(layout, one.face_load_factor),
+                "root_face_load_factor": _root_factor(layout, one.face_load_factor),
                 "edge_contact": one.edge_contact,
                 "loaded_share": one.loaded_share,
             }
@@ -394,7 +394,7 @@ def _layout(layout: FlankLineLayout) -> dict[str, Any]:
         "pinion": line(layout.pinion),
         "wheel": line(layout.wheel),
         "face_load_factor": dict(zip(("unmodified", "step_1"), factors)),
-        "root_face_load_factor": dict(zip(("unmodified", "step_1"), root_factor(layout, factors))),
+        "root_face_load_factor": dict(zip(("unmodified", "step_1"), _root_factor(layout, factors))),
         "cases": CASES,
         **_by_step({f"{step} cases": cases(of, number) for number, (step, of) in enumerate(zip(STEPS, layout.cases))}),
         **life,
@@ -419,7 +419,7 @@ def _record(heading: str, of: Callable[[FlankLineLayout], Any], form: str = ".3f
 def _factors(heading: str, step: int) -> Iterator[Record[FlankLineLayout]]:
     """K_Hbeta and K_Fbeta after a step without deviations."""
     yield _record(heading.format("K_Hbeta"), lambda of: of.factors[step])
-    yield _record(heading.format("K_Fbeta"), lambda of: root_factor(of, of.factors[step]))
+    yield _record(heading.format("K_Fbeta"), lambda of: _root_factor(of, of.factors[step]))
 
 
 def _life(step: int, after: str) -> Record[FlankLineLayout]:
@@ -441,7 +441,7 @@ def _cases(name: str, tolerance: FlankLineTolerance, *, lives: bool) -> Iterator
         yield record(f"  K_Hbeta, {case}", factor(number))
     yield record(
         "  K_Fbeta, worst case",
-        lambda of: (f"{float(root_factor(of, np.max(step[name].face_load_factor))):.3f} " for step in of.cases),
+        lambda of: (f"{float(_root_factor(of, np.max(step[name].face_load_factor))):.3f} " for step in of.cases),
     )
     if lives:
         yield record("  life, worst case [h]", lambda of: (f"{float(np.min(each)):.4g} " for each in of.lives[name]))

@@ -88,7 +88,7 @@ _STEEPEST = 2.0  # slant of a relief that begins a quarter of the way to the tip
 _HALVINGS = 5  # of the range of slants: the slant is the least one within 1/16
 
 
-class Levelled(NamedTuple):
+class _Levelled(NamedTuple):
     """States of an iteration.
 
     Attributes:
@@ -134,7 +134,7 @@ class Pressure:
         """Relative excess of a pressure over the limit, zero within the tolerance."""
         return float(counted(self.excess(pressure)))
 
-    def holds_between(self, found: Levelled, mesh: Mesh) -> bool:
+    def holds_between(self, found: _Levelled, mesh: Mesh) -> bool:
         """True if the result also meets the limit at four times the positions of the mesh."""
         best, pressure = found.iterates[found.best], found.pressures[found.best]
         count = self.meshes[0].resolution.positions
@@ -152,9 +152,9 @@ def levelled(
     steps: int,
     spent: list[int],
     callback: Callback | None,
-) -> Levelled:
+) -> _Levelled:
     """Run the iteration; appends the number of contact analyses of every step to `spent`."""
-    found = Levelled([], [], [], [], 0)
+    found = _Levelled([], [], [], [], 0)
     level = float("nan")
     for step in range(steps + 1):
         pinion, wheel, cycle, highest, solves = _least_slant(mesh, flanks, pressure, limited=step > 0)
@@ -302,7 +302,7 @@ class TransmissionErrorIteration(Checked, AbstractMethod):
         limit = None if self.max_pressure is None else Constraint("max_contact_pressure", high=self.max_pressure)
         spent: list[int] = []
 
-        def end_on(finer: Mesh, between: bool = True) -> tuple[Levelled, bool]:
+        def end_on(finer: Mesh, between: bool = True) -> tuple[_Levelled, bool]:
             flanks = IteratedFlanks(mesh, pinion, wheel, self.max_relief)
             pressure = Pressure(limit, torque, parts(finer, mesh.resolution.positions))
             found = levelled(mesh, flanks, pressure, self.rtol, self.steps, spent, callback)

@@ -40,7 +40,7 @@ class Chebyshev(AbstractScalarization):
         return factor, -factor * low
 
 
-class Met:
+class _Met:
     """Non-dominated designs so far that meet the constraints."""
 
     def __init__(self, record: Record, frame: tuple[np.ndarray, np.ndarray] | None = None) -> None:
@@ -144,7 +144,7 @@ class Met:
         return self._points[order], self._values[order]
 
 
-class Descent(AbstractScalarization):
+class _Descent(AbstractScalarization):
     """Scalarization by the largest change of the objectives from their values at a point, in spans of the front."""
 
     part = 0.0
@@ -180,14 +180,14 @@ class Pareto(Checked):
     points: int = count(low=2, high=4096, default=32)
     steps: int = count(high=100_000, default=20)
 
-    def search(self, problem: Problem, record: Record) -> "Met":
+    def search(self, problem: Problem, record: Record) -> "_Met":
         """Run all rounds; returns at most `points` designs.
 
         Raises:
             ValueError: for fewer points than objectives.
             RuntimeError: if no design meets the constraints.
         """
-        met, objectives = Met(record), len(problem.objectives)
+        met, objectives = _Met(record), len(problem.objectives)
         if self.points < objectives:
             raise ValueError(f"Pareto: points = {self.points} must be at least the number of objectives, {objectives}")
         # in blocks: every other point of the Halton sequence covers half of the box only
@@ -204,10 +204,10 @@ class Pareto(Checked):
         met.end(self.points)
         return met
 
-    def end_on(self, mesh: Mesh, met: "Met") -> tuple["Met", bool]:
+    def end_on(self, mesh: Mesh, met: "_Met") -> tuple["_Met", bool]:
         """Continue the designs of a front on a finer mesh; returns them, and True if the mesh is fine enough."""
         record = met.record.on(met.record.problem.on(mesh))
-        finer = Met(record, met.frame())
+        finer = _Met(record, met.frame())
         searches = [Search(point, Chebyshev(met.weight(value), finer.frame)) for point, value in zip(*met.rows())]
         linearizer = record.linearizer or Linearizer(record.problem, self.points)
         follow(linearizer, finer, searches, steps=_POLISH, rtol=_RTOL)
@@ -246,7 +246,7 @@ def pareto(
     met = method.search(problem, Record(problem, callback))
     if positions is not None:
 
-        def end_on(finer: Mesh) -> tuple[Met, bool]:
+        def end_on(finer: Mesh) -> tuple[_Met, bool]:
             nonlocal met
             met, enough = method.end_on(finer, met)
             return met, enough
@@ -279,7 +279,7 @@ def _evidence(record: Record, points, values, span, batch: int) -> np.ndarray:
         rows = slice(start, min(start + batch, len(points)))
         record.spend(len(points[rows]), analyses=problem.gradient_cost)
         for index, found in zip(range(rows.start, rows.stop), linearizer(points[rows])):
-            way = Descent(values[index], span)
+            way = _Descent(values[index], span)
             left[index] = LinearModel(problem, points[index], found, way).optimality(PROBE)
     return left
 

@@ -28,7 +28,7 @@ _ENOUGH = 0.1  # of the tolerance of a limit: what a step of theirs has to gain
 Found = TypeVar("Found")
 
 
-class Refined(NamedTuple):
+class _Refined(NamedTuple):
     """Result of the end of a search.
 
     Attributes:
@@ -46,7 +46,7 @@ class Refined(NamedTuple):
 
 def refined(
     record: Record, polish: Polish, positions: int | None, steps: Mapping[str, float] = MappingProxyType({})
-) -> Refined:
+) -> _Refined:
     """Continue a search from its best design on finer meshes, see `on_finer_meshes`, and round the variables.
 
     If no design so far meets all limits, a design that meets them is sought, whatever its objective.
@@ -59,10 +59,10 @@ def refined(
     """
     if positions is None:
         _kept_to_limits(record, polish)
-        return Refined(_on_steps(record, steps, polish), float("nan"), record)
+        return _Refined(_on_steps(record, steps, polish), float("nan"), record)
     problem = record.problem
 
-    def end_on(mesh: Mesh) -> tuple[Refined, bool]:
+    def end_on(mesh: Mesh) -> tuple[_Refined, bool]:
         nonlocal record
         found = record.on(problem.on(mesh))
         polish(found.problem, found, record.point)
@@ -73,7 +73,7 @@ def refined(
         change = problem.objectives[0].sign * (float(values[0, 0] - ends.value) + _left_by_slices(ends))
         found.evaluations = ends.evaluations
         now = np.asarray([[ends.value]]), np.asarray([ends.violation])
-        return Refined(ends, change, found), fine_enough(*now, values, violations)
+        return _Refined(ends, change, found), fine_enough(*now, values, violations)
 
     return on_finer_meshes(problem.mesh, positions, end_on)
 

@@ -49,7 +49,7 @@ Band = Callable[[Side, AbstractModification, ToleranceClass], Edges]  # about a 
 Frame = Callable[[Axes, Side, str], None]
 
 
-def flank_panels(
+def _flank_panels(
     mesh: Mesh,
     designs: Mapping[str, Design],
     ax: Panels | None,
@@ -169,7 +169,7 @@ def lead_chart(
     Returns:
         the two Axes.
     """
-    return flank_panels(mesh, designs, ax, _line, _over_face, tolerance=tolerance, about=about, band=_lead_band)
+    return _flank_panels(mesh, designs, ax, _line, _over_face, tolerance=tolerance, about=about, band=_lead_band)
 
 
 def _lead_band(side: Side, design: AbstractModification, quality: ToleranceClass) -> Edges:
@@ -225,7 +225,7 @@ def k_chart(
     Returns:
         the two Axes.
     """
-    return flank_panels(
+    return _flank_panels(
         mesh,
         designs,
         ax,

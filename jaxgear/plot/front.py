@@ -38,7 +38,7 @@ ANALYSES_LABEL = "contact analyses spent [-]"
 _NARROW = 5.0  # largest over smallest value below which a logarithmic axis has too few round numbers of its own
 
 
-def objective_labels(problem: Problem | None) -> list[str]:
+def _objective_labels(problem: Problem | None) -> list[str]:
     """Labels of the objectives of a problem: "95 % CVaR of peak-to-peak transmission error [µm]".
 
     Args:
@@ -52,7 +52,7 @@ def objective_labels(problem: Problem | None) -> list[str]:
 
 def best_label(optimum: Optimum) -> str:
     """Label of the objective of a search; for several objectives of the distance from the ideal."""
-    labels = objective_labels(optimum.problem)
+    labels = _objective_labels(optimum.problem)
     return labels[0] if len(labels) == 1 else "distance from the ideal [-]"
 
 
@@ -107,12 +107,12 @@ def pareto(table: Table[Of], ax: Axes | None = None, *, marked: Mapping[str, int
         best = values[front][np.argsort(values[front, 0], kind="stable")]
         if third:
             text = f"Pareto front of all three results, {len(best)} variants"
-            front_dots(ax, best, text, axis_label(third[0]), turned=third[0].better == "larger")
+            _front_dots(ax, best, text, axis_label(third[0]), turned=third[0].better == "larger")
         else:
             # along x, the next variant is better in y: where x is to be small the old y holds until there
-            front_steps(ax, best, f"Pareto front, {len(best)} variants", where="post" if x.sign > 0 else "pre")
+            _front_steps(ax, best, f"Pareto front, {len(best)} variants", where="post" if x.sign > 0 else "pre")
         for index, (name, row) in enumerate((marked or {}).items()):
-            front_star(ax, values[row], name, index)
+            _front_star(ax, values[row], name, index)
         ax.set(xlabel=axis_label(x), ylabel=axis_label(y))
         legend_above(ax)
     return ax
@@ -127,7 +127,7 @@ def _cloud(ax: Axes, others: np.ndarray, text: str) -> None:
     ax.plot([], [], "h", markersize=6, color="#A6A6A6", label=f"{text}, darker where there are more")
 
 
-def front_steps(ax: Axes, best: np.ndarray, text: str, *, where: Literal["pre", "post"] = "post") -> None:
+def _front_steps(ax: Axes, best: np.ndarray, text: str, *, where: Literal["pre", "post"] = "post") -> None:
     """Draw the border of the dominated region as steps between the designs of the front.
 
     Args:
@@ -141,7 +141,7 @@ def front_steps(ax: Axes, best: np.ndarray, text: str, *, where: Literal["pre", 
     ax.plot(*best[:, :2].T, "o", markersize=4, color=style["color"], label=text, zorder=4)
 
 
-def front_dots(ax: Axes, best: np.ndarray, text: str, bar_text: str, *, turned: bool = False) -> None:
+def _front_dots(ax: Axes, best: np.ndarray, text: str, bar_text: str, *, turned: bool = False) -> None:
     """Draw a front of three columns with the third as colour; `turned` is True if its larger values are better."""
     image = ax.scatter(
         *best[:, :2].T,
@@ -156,7 +156,7 @@ def front_dots(ax: Axes, best: np.ndarray, text: str, bar_text: str, *, turned: 
     colour_bar(image, ax, bar_text, pad=0.03)
 
 
-def front_star(ax: Axes, values: np.ndarray, text: str, index: int = 0) -> None:
+def _front_star(ax: Axes, values: np.ndarray, text: str, index: int = 0) -> None:
     """Draw a star at a marked design."""
     style = {"color": line_style(index + 2)["color"], "markeredgecolor": "white"}
     ax.plot(*values[:2], marker="*", markersize=11, linestyle="", label=text, zorder=5, **style)
@@ -187,16 +187,16 @@ def optimum_front(
     count = len(front.values)
     if chosen is not None and not 0 <= chosen < count:
         raise ValueError(f"chosen is {chosen}, must be a design of the front, 0 to {count - 1}")
-    labels = objective_labels(front.compromise.problem)
+    labels = _objective_labels(front.compromise.problem)
     with report_axes(ax) as ax:
         if len(labels) == 2:
-            front_steps(ax, front.values, f"Pareto front, {count} designs")
+            _front_steps(ax, front.values, f"Pareto front, {count} designs")
         else:
-            front_dots(ax, front.values, f"Pareto front, {count} designs", wrapped(labels[2]))
+            _front_dots(ax, front.values, f"Pareto front, {count} designs", wrapped(labels[2]))
         if chosen is not None:
             units = map(printed_unit, front.units)
             values = [f"{value:.3g} {unit}".strip() for value, unit in zip(front.values[chosen], units)]
-            front_star(ax, front.values[chosen], f"chosen: {', '.join(values)}")
+            _front_star(ax, front.values[chosen], f"chosen: {', '.join(values)}")
         for index, (name, other) in enumerate((others or {}).items()):
             ax.plot(*np.asarray(other)[:2], zorder=5, label=name, **point_style(index + _STYLES_OF_FRONT))
         ax.set(xlabel=labels[0], ylabel=wrapped(labels[1]))

@@ -25,7 +25,7 @@ def middle_path(cycle: MeshCycle) -> np.ndarray:
     return path - float(kinematics.face_coordinate[0] * kinematics.pair.path_slope)
 
 
-def path_label(cycles: Iterable[MeshCycle]) -> str:
+def _path_label(cycles: Iterable[MeshCycle]) -> str:
     """Axis label of path positions, which are those at mid-face if any of the cycles is of helical gears."""
     return PATH_LABEL.replace(" [", ", mid-face [") if any(cycle.kinematics.helical for cycle in cycles) else PATH_LABEL
 
@@ -51,7 +51,7 @@ def pair_history(cycle: MeshCycle, values: ArrayLike) -> tuple[np.ndarray, np.nd
     return path[order], stages[..., order]
 
 
-def path_limits(cycles: Iterable[MeshCycle]) -> tuple[float, float]:
+def _path_limits(cycles: Iterable[MeshCycle]) -> tuple[float, float]:
     """Path range that holds the path of contact and all loaded contact of these cycles, with some air [mm]."""
     low, high = [], []
     for cycle in cycles:
@@ -106,8 +106,8 @@ def load_sharing(cycles: Mapping[str, MeshCycle], ax: Axes | None = None) -> Axe
             ax.plot(*pair_history(cycle, share(cycle)), label=name, **line_style(index))
         if cycles:
             mark_path(ax, next(iter(cycles.values())).kinematics.path_of_contact)
-            ax.set_xlim(path_limits(cycles.values()))
-        ax.set(ylim=(0, 1.05), xlabel=path_label(cycles.values()), ylabel="share of the pair in the load [-]")
+            ax.set_xlim(_path_limits(cycles.values()))
+        ax.set(ylim=(0, 1.05), xlabel=_path_label(cycles.values()), ylabel="share of the pair in the load [-]")
         legend_above(ax, distance=ABOVE_MARKS)
     return ax
 
@@ -173,9 +173,9 @@ def pressure(cycles: Mapping[str, MeshCycle], ax: Axes | None = None) -> Axes:
             ax.plot([], [], color=GREY, linestyle="none", marker="o", markersize=3, label=label)
         if cycles:
             mark_path(ax, next(iter(cycles.values())).kinematics.path_of_contact)
-            ax.set_xlim(path_limits(cycles.values()))
+            ax.set_xlim(_path_limits(cycles.values()))
         ax.set_ylim(bottom=0)
-        ax.set(xlabel=path_label(cycles.values()), ylabel="pressure [MPa]")
+        ax.set(xlabel=_path_label(cycles.values()), ylabel="pressure [MPa]")
         legend_above(ax, distance=ABOVE_MARKS)
     return ax
 

@@ -68,11 +68,11 @@ def side_bands(
         ValueError: as `shaft_orders`, and for more side bands.
     """
     whole("harmonic", harmonic)
-    orders = np.asarray(side_band_orders(revolution, gear, harmonic, count))
+    orders = np.asarray(_side_band_orders(revolution, gear, harmonic, count))
     return shaft_orders(revolution, gear, int(orders[-1])).amplitude[..., orders - 1]
 
 
-def side_band_orders(revolution: Revolution, gear: GearName, harmonic: int = 1, count: int = _SIDE_BANDS) -> list[int]:
+def _side_band_orders(revolution: Revolution, gear: GearName, harmonic: int = 1, count: int = _SIDE_BANDS) -> list[int]:
     """Shaft orders of `side_bands` in ascending order."""
     whole_revolutions(revolution, gear)
     teeth = revolution.teeth[GEARS.index(gear)]

@@ -230,7 +230,7 @@ class Model:
 def _attributes_of(values: dict[str, tuple[Any, str]]) -> dict[str, Attribute]:
     """Attributes from (value, unit); values that are None are left out."""
     given = {name: pair for name, pair in values.items() if pair[0] is not None}
-    return {name: Attribute(written(value), unit, kind_of(name, value, unit)) for name, (value, unit) in given.items()}
+    return {name: Attribute(written(value), unit, _kind_of(name, value, unit)) for name, (value, unit) in given.items()}
 
 
 def model_of(data: dict[str, Any]) -> Model:
@@ -239,7 +239,7 @@ def model_of(data: dict[str, Any]) -> Model:
     Raises:
         DesignFileError: for data of another structure, or an id that is not a number or occurs twice.
     """
-    model = Model(checked_version(str(data.get("version", ""))))
+    model = Model(_checked_version(str(data.get("version", ""))))
     for component in map(_component, _objects(data, "components")):
         if component.id in model.components:
             raise DesignFileError(component.where(), "is given twice in the file")
@@ -346,7 +346,7 @@ _TEXTS = ("model_name",)  # the other words are of lists
 _CODES = {"float64": "<f8", "float32": "<f4", "int32": "<i4"}
 
 
-def kind_of(name: str, value: object, unit: str) -> str:
+def _kind_of(name: str, value: object, unit: str) -> str:
     """Type of a value by its name in REXS; a text is a word of a list, or a number written by `shifted`."""
     if isinstance(value, bool):
         return "boolean"
@@ -359,7 +359,7 @@ def kind_of(name: str, value: object, unit: str) -> str:
     return f"{kind}_array" if array.ndim else kind
 
 
-def checked_version(version: str) -> str:
+def _checked_version(version: str) -> str:
     """Version of a file; raises for another text."""
     if not re.fullmatch(r"\d+(\.\d+){1,2}", version, re.ASCII):
         raise DesignFileError("model: version", f'"{version}" is not a version of REXS')

@@ -17,12 +17,12 @@ from .export import ExportStudy as ExportStudy
 from .optimization_result import OptimizationResult as OptimizationResult
 from .progress import Progress as Progress
 from .progress import Stages as Stages
-from .results import study_summary as study_summary
-from .results import write_results as write_results
 from .revolution import RevolutionResult as RevolutionResult
 from .revolution import RevolutionStudy as RevolutionStudy
 from .study import AbstractStudy as AbstractStudy
 from .study import AbstractStudyResult as AbstractStudyResult
+from .summary import study_summary as study_summary
+from .summary import write_results as write_results
 from .sweep import SweepStudy as SweepStudy
 from .sweep_result import SweepResult as SweepResult
 from .wear import WearStudy as WearStudy

@@ -24,7 +24,7 @@ from . import manufactured, side_by_side
 from .evaluation import Evaluation
 from .gear_data import FACTORS, gears, mounting, rating_page
 from .study import AbstractStudyResult
-from .summary_data import fields_data, finding_data, flanks_data, key_of, model, sizes
+from .summary import fields_data, finding_data, flanks_data, key_of, model, sizes
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ from ..numerics import UnitKey
 from ..report import Figure, Record, Table, numbers_of, table_of
 from .evaluation import grid_lines
 from .study import AbstractStudyResult
-from .summary_data import fields_data, flanks_data, model
+from .summary import fields_data, flanks_data, model
 
 _COLUMNS = {
     "dynamic_factor": "dynamic_factor",

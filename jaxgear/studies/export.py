@@ -17,7 +17,7 @@ from .comparison import Modifications, compared, search_of
 from .evaluation import torques_of
 from .progress import Stages
 from .study import AbstractStudy, AbstractStudyResult
-from .summary_data import flanks_data
+from .summary import flanks_data
 
 _QUICK_POSITIONS = 64  # of the force map
 

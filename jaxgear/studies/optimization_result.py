@@ -25,7 +25,7 @@ from . import side_by_side
 from .comparison_result import ComparisonResult
 from .evaluation import response_surface
 from .gear_data import mounting
-from .summary_data import flanks_data
+from .summary import flanks_data
 
 _SAME = 0.05  # [%]; a smaller change rounds to nothing
 _USUAL = "none, inputs and results lie within the usual ranges"
@@ -107,7 +107,7 @@ COMPROMISE = "compromise"  # name of the design of a front that is reported
 _SHOWN_PARAMETERS = 6  # with more parameters the columns are only written to a file
 
 
-def others_of(front: Front, evaluations: side_by_side.Evaluations) -> dict[str, np.ndarray]:
+def _others_of(front: Front, evaluations: side_by_side.Evaluations) -> dict[str, np.ndarray]:
     """Objectives of the designs that are compared with the front, by name, shape (objectives,)."""
     return {
         name: np.asarray(list(found.objectives.values()))
@@ -134,7 +134,7 @@ def front_table(front: Front, evaluations: side_by_side.Evaluations, of_variable
         label = f"{row + 1}, {COMPROMISE}" if row == front.chosen else f"{row + 1}"
         result.add_row(label, *(f"{value:.4g}" for value in cells))
     result.add_section()
-    for name, values in others_of(front, evaluations).items():
+    for name, values in _others_of(front, evaluations).items():
         result.add_row(name, *(f"{value:.4g}" for value in values), *("-" for _ in names))
     return result
 
@@ -148,7 +148,7 @@ def front_rows(front: Front, signs: Sequence[int], evaluations: side_by_side.Eva
         evaluations: evaluations by the name of the design.
     """
     yield COMPROMISE, "the design of the front whose worst distance from the best of each objective is least"
-    for name, values in others_of(front, evaluations).items():
+    for name, values in _others_of(front, evaluations).items():
         better = ((front.values - values) * np.asarray(signs) < 0).all(axis=1)
         found = ", ".join(str(row + 1) for row in np.flatnonzero(better)) or "none"
         rows = "all" if better.all() else found
@@ -160,7 +160,7 @@ _DIGITS = {"um": ".2f", "mm": ".3f"}
 _MOST = 4  # most numbers of a curve that are printed
 
 
-def to_grind(mesh: Mesh, pinion: AbstractModification, wheel: AbstractModification, design: str = "") -> Rows:
+def _to_grind(mesh: Mesh, pinion: AbstractModification, wheel: AbstractModification, design: str = "") -> Rows:
     """Rows (gear, text) of the modifications to grind, one for every part of both modifications.
 
     Args:
@@ -315,7 +315,7 @@ class OptimizationResult(ComparisonResult):
         if front is None:  # the compromise of a front is measured by the front so far, which moves
             yield Figure.of(plot.convergence, {optimum.method: optimum})
         else:
-            others = others_of(front, self.evaluations)
+            others = _others_of(front, self.evaluations)
             yield replace(Figure.of(plot.optimum_front, front, chosen=front.chosen, others=others), name="front")
         if optimum.iterations:
             yield Figure.of(plot.iterations_relief, mesh, optimum)
@@ -325,9 +325,9 @@ class OptimizationResult(ComparisonResult):
         """Tables of the modification to grind, the gain, and the checks of the result."""
         optimum, projection, evaluations = self.optimum, self.projection, self.evaluations
         name, best = side_by_side.main_name(evaluations), side_by_side.main(evaluations)
-        rows = [*_overloads(self.unusual[name], optimum), *to_grind(optimum.mesh, best.pinion, best.wheel)]
+        rows = [*_overloads(self.unusual[name], optimum), *_to_grind(optimum.mesh, best.pinion, best.wheel)]
         if projection is not None:
-            rows += to_grind(optimum.mesh, projection.pinion, projection.wheel, f"as {projection.curve}")
+            rows += _to_grind(optimum.mesh, projection.pinion, projection.wheel, f"as {projection.curve}")
         yield Table(("", ""), tuple(rows), f"Modification to grind: {name} of {self.design.title}")
         gained = [*gains(evaluations, optimum.problem), *_rounding(self.design, optimum)]
         if self.front is not None and optimum.problem is not None:

@@ -22,7 +22,7 @@ from .checkpoints import Checkpoints
 from .comparison import compared, search_of
 from .progress import Stages
 from .study import AbstractStudy, AbstractStudyResult
-from .summary_data import flanks_data
+from .summary import flanks_data
 
 _PANEL = 62.0  # height [mm]
 

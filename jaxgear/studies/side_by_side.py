@@ -35,7 +35,7 @@ def table(file: DesignFile, evaluations: Evaluations) -> Table:
     result = Table(("", *evaluations), title=f"{file.title}, {file.load_in_words} on the pinion")
     first = next(iter(evaluations.values()))
     second = verified(evaluations)
-    rows = quantities_of(evaluations)
+    rows = _quantities_of(evaluations)
     asked = [quantity for quantity in rows if quantity.named in first.objectives]
     for label in objectives(evaluations):
         result.add_row(label, *(format(evaluation.objectives[label], ".4g") for evaluation in evaluations.values()))
@@ -115,7 +115,7 @@ def grid(evaluations: Evaluations, more: str = "") -> Iterator[str]:
     return grid_lines(grid_of(moving.resolution, helical=moving.helical), changes, more)
 
 
-def quantities_of(evaluations: Evaluations) -> list[Quantity]:
+def _quantities_of(evaluations: Evaluations) -> list[Quantity]:
     """Quantities evaluated for all designs, in the order of the vocabulary."""
     known = [evaluation.metrics for evaluation in evaluations.values()]
     return [quantity for quantity in quantities.values() if all(quantity.key in metrics for metrics in known)]
@@ -123,7 +123,7 @@ def quantities_of(evaluations: Evaluations) -> list[Quantity]:
 
 def objectives(evaluations: Evaluations) -> list[str]:
     """Labels of objectives of an optimization that are not rows of the table already."""
-    known = {quantity.named for quantity in quantities_of(evaluations)}
+    known = {quantity.named for quantity in _quantities_of(evaluations)}
     return [label for label in next(iter(evaluations.values())).objectives if label not in known]
 
 

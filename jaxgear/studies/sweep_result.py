@@ -19,9 +19,8 @@ from ..sweeps import SweepTable
 from . import side_by_side
 from .comparison import Modifications
 from .evaluation import evaluation_of, torques_of
-from .results import save_figures
 from .study import AbstractStudyResult
-from .summary_data import sizes
+from .summary import save_figures, sizes
 
 TABLE, BEST = "table", "best.csv"  # separate, as readers of the table expect a folder without other files
 WORKBOOK, PAGE = "variants.xlsx", "variants.html"

@@ -30,7 +30,7 @@ from ..wear import (
 from ..wear.quantities import blocks_are_short, number_of
 from . import manufactured, wear_scatter
 from .study import AbstractStudyResult
-from .summary_data import fields_data, flanks_data
+from .summary import fields_data, flanks_data
 
 _QUANTITIES = (
     "ppte",

@@ -62,7 +62,7 @@ class WornFlank(AbstractModification):
         return low + (place - left.astype(place.dtype)) * (high - low)
 
 
-def every_other(depth: Float[Array, "*shape points"]) -> Float[Array, "*shape points"]:
+def _every_other(depth: Float[Array, "*shape points"]) -> Float[Array, "*shape points"]:
     """Depth interpolated linearly from every other point of an even grid; the last point keeps its value."""
     between = 0.5 * (depth[..., :-2:2] + depth[..., 2::2])
     return depth.at[..., 1:-1:2].set(between)
@@ -110,7 +110,7 @@ class OfLubrication(eqx.Module):
 
     def __call__(self, cycle: MeshCycle) -> Field:
         kinematics, speed = cycle.kinematics, cycle.operating_point.speed
-        assert speed is not None  # `wear_law` has asked for it
+        assert speed is not None  # `_wear_law` has asked for it
         friction = {} if cycle.operating_point.friction is None else {"friction": cycle.operating_point.friction}
         contact = kinematics.path_of_contact
         sliding = contact.sliding_speed(jnp.clip(kinematics.path, contact.start, contact.end), speed)
@@ -134,7 +134,7 @@ class OfLubrication(eqx.Module):
         return jnp.where(loaded, jnp.stack([jnp.broadcast_to(field, shape) for field in fields]), 0.0)
 
 
-def wear_law(coefficient: Coefficient, loads: OperatingPoint, dtype: np.dtype) -> Constant | OfLubrication:
+def _wear_law(coefficient: Coefficient, loads: OperatingPoint, dtype: np.dtype) -> Constant | OfLubrication:
     """Wear coefficient of both gears as a function of a cycle [m2/N], for (gears, pairs, slices, positions).
 
     Raises:
@@ -302,7 +302,7 @@ class Case(eqx.Module):
             own = cycle.line_load / jnp.maximum(1 + cycle.relative_curvature, FLATTEST)
             given = cycle.line_load if self.mesh.compliance.averages_over_loaded_width else None
             here = largest(depth, cycle, load, given)
-            coarse, narrow = largest(every_other(depth), cycle, load, given), largest(depth, cycle, load, own)
+            coarse, narrow = largest(_every_other(depth), cycle, load, given), largest(depth, cycle, load, own)
             return jnp.abs(coarse - here) + jnp.abs(narrow - here)
 
         def on(state):
@@ -386,7 +386,7 @@ def case_of(
     dtype = mesh.slice_width.dtype
     loads, weights = _loads(torque, dtype)
     check_torque(mesh.support_torque, loads.torque)
-    law = wear_law(coefficient, loads, dtype)
+    law = _wear_law(coefficient, loads, dtype)
     points = points_for(mesh.resolution.positions) if points is None else whole("points", points, low=3)
     other = _deviation(mesh, deviation)
     flanks = {"pinion": pinion, "wheel": wheel}
