@@ -21,7 +21,8 @@ from ..vocabulary import quantities
 
 def _symbol(name: str, unit: str, symbol: str) -> UnitKey:
     """Key of a number that has a symbol in the standards."""
-    words = quantities[name].words if name in quantities else name.replace("_", " ")
+    known = [each.words for each in quantities.every(name) if each.takes is None]  # others are of a rating
+    words = known[0] if known else name.replace("_", " ")
     return UnitKey(name, unit, words if words.endswith(symbol) else f"{words}, {symbol}")
 
 
