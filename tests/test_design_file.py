@@ -924,6 +924,7 @@ def test_examples_load_and_are_what_their_name_says(path):
     file = load_design(path)
     teeth = [int(gear.teeth) for gear in (file.pair().pinion, file.pair().wheel)]
     kinds = {
+        "rated": "rating" in file.tables,
         "lubricated": "lubricant" in file.tables,
         "sweep": "sweep" in file.tables,
         "dynamics": "dynamics" in file.tables,
@@ -935,7 +936,7 @@ def test_examples_load_and_are_what_their_name_says(path):
     hand = "spur" if file.pair().is_spur else "helical"
     kind = next((name for name, is_so in kinds.items() if is_so), hand)
     assert path.stem == f"{kind}_{teeth[0]}_{teeth[1]}"
-    seeks = optimize_of(file).method in METHODS_WITHOUT_VARIABLES or kinds["layout"]
+    seeks = optimize_of(file).method in METHODS_WITHOUT_VARIABLES or kinds["layout"] or kinds["rated"]
     assert (file.bounds or seeks) and file.title
     file.design({name: 0.5 * (low + high) for name, (low, high) in file.bounds.items()})
 
