@@ -177,7 +177,7 @@ def test_contact_on_shafts_meets_the_conditions(on_shafts):
     deflected = np.einsum("psjtn,jtn->psn", influence(mesh.coupling, mesh.slice_width), load)
     bent = np.asarray(mesh.support.influence(mesh.face_coordinate))
     alone = jg.prepare(mesh.pair, resolution=mesh.resolution).coupling  # bodies lean as on rigid shafts
-    bent += np.asarray(alone.support_modes @ alone.support @ alone.support_modes.T)
+    bent = bent + np.asarray(alone.support_modes @ alone.support @ alone.support_modes.T)
     deflected += lever * float(mesh.slice_width[0]) * np.einsum("st,jtn,jtn->sn", bent, lever, load)
     approach = np.asarray(cycle.transmission_error) - float(mesh.hub * cycle.force / mesh.pair.face_width)
     law = np.asarray(mesh.law.deflection(jnp.asarray(load)))
