@@ -31,9 +31,10 @@ VALIDITY = {
     "face load factor K_Fbeta": Usual(1.0, _INFINITE, "", "the largest line load is at least the mean"),
     "transverse load factor K_Halpha": Usual(1.0, _INFINITE, "", "at least the even share"),
     "v z1 / 100 sqrt(u^2 / (1 + u^2))": Usual(LEAST_SPEED, _INFINITE, "m/s", "K_v by method B is of little use below"),
-    "profile shift x1 - x2": Usual(-1e-6, _INFINITE, "", "c' of ISO 6336-1 is known for x1 >= x2"),
+    "profile shift x1 - x2": Usual(0.0, _INFINITE, "", "c' of ISO 6336-1 is known for x1 >= x2"),
     "profile shift x1 + x2": Usual(-0.5, 2.0, "", "c' of ISO 6336-1 is known from -0.5 to 2"),
 }
+_DIGITS = 6  # to which profile shifts are compared
 # resonance ratios to be kept clear of
 _RESONANCE = 0.85, 1.15
 _BELOW, _ABOVE = (
@@ -71,7 +72,7 @@ def _of_mesh(rating: Rating, found: PairRating) -> Iterator[Finding]:
     teeth = list(map(float, geometry.teeth))
     if teeth[0] > teeth[1]:  # 1 is the smaller gear of c', whatever drives
         first, second = second, first
-    yield _finding("profile shift x1 - x2", first - second)
+    yield _finding("profile shift x1 - x2", round(first - second, _DIGITS))
     yield _finding("profile shift x1 + x2", first + second)
 
 
