@@ -108,7 +108,7 @@ HEAVY = {
     "jaxgear.plot",
 }
 # so do the commands, and their help without any of the library
-_NAMES = "devices", "new", "run"
+_NAMES = "jax_setup", "new", "run"
 COMMANDS = {*(f"jaxgear.cli.{name}" for name in _NAMES), "jaxgear.rexs.convert"}
 
 

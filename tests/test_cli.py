@@ -26,7 +26,7 @@ from report_page import Page, check_report
 
 import jaxgear as jg
 from jaxgear import plot
-from jaxgear.cli import cache, main, run
+from jaxgear.cli import jax_setup, main, run
 from jaxgear.contact.status import Status
 from jaxgear.geometry import over_balls
 from jaxgear.io import Search, first_look, load_design
@@ -915,33 +915,33 @@ def no_cache_of_jax():
 
 def test_the_cache_is_a_private_folder_and_never_an_obstacle(tmp_path, monkeypatch, no_cache_of_jax):
     kept = []
-    monkeypatch.setattr(cache, "keep", kept.append)
+    monkeypatch.setattr(jax_setup, "keep", kept.append)
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    folder = cache.enable_cache()
+    folder = jax_setup.enable_cache()
     assert len(kept) == 1 and folder.is_relative_to(tmp_path)
     assert stat.S_IMODE(folder.stat().st_mode) & 0o077 == 0
     folder.chmod(0o777)  # others could place programs here
-    assert cache.enable_cache() is None
+    assert jax_setup.enable_cache() is None
     folder.chmod(0o700)
     tmp_path.chmod(0o777)  # and here another folder of this name
-    assert cache.enable_cache() is None
+    assert jax_setup.enable_cache() is None
     tmp_path.chmod(0o1777)  # but not one that is not theirs
-    assert cache.enable_cache() == folder
+    assert jax_setup.enable_cache() == folder
     tmp_path.chmod(0o700)
     kept.clear()
     before = os.umask(0)
     try:
         monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "new" / "cache"))
-        made = cache.enable_cache()
+        made = jax_setup.enable_cache()
     finally:
         os.umask(before)
     ways = [part for part in made.parents if part != tmp_path and part.is_relative_to(tmp_path)]
     assert len(ways) == 3 and all(stat.S_IMODE(part.stat().st_mode) == 0o700 for part in ways)
     (tmp_path / "file").write_text("")
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
-    assert cache.enable_cache() is None
+    assert jax_setup.enable_cache() is None
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     folder.chmod(0o700)
     jax.config.update("jax_compilation_cache_dir", "/elsewhere")  # its variable sets it too
-    assert cache.enable_cache() is None
+    assert jax_setup.enable_cache() is None
     assert len(kept) == 1

@@ -15,7 +15,7 @@ from jaxgear.contact import removed_material
 from jaxgear.contact.prescribed import solve_forces
 from jaxgear.dynamics import Dynamics, natural_frequencies
 from jaxgear.wear import Wear, mean_over_life, over_life, wear, wear_depth, worn_volume
-from jaxgear.wear.quantities import OF_HISTORY
+from jaxgear.wear.settings import OF_HISTORY
 from jaxgear.wear.worn_volume import deposit
 
 SIZES = LINE

@@ -16,7 +16,7 @@ import pytest
 from catalogue import LINE, SLIDING, gear_pair
 
 import jaxgear as jg
-from jaxgear.cli import cache
+from jaxgear.cli import jax_setup
 from jaxgear.contact import begin_contact
 from jaxgear.contact import mesh as mesh_module
 from jaxgear.numerics import programs
@@ -194,7 +194,7 @@ def test_equal_objects_are_one_recipe_whether_they_are_one_object_or_two():
 
 
 def test_files_are_whole_or_not_there(tmp_path):
-    files = cache.Files(tmp_path)
+    files = jax_setup.Files(tmp_path)
     assert files.read(b"recipe") is None
     files.write(b"recipe", b"program")
     (file,) = tmp_path.iterdir()
@@ -203,14 +203,14 @@ def test_files_are_whole_or_not_there(tmp_path):
     for damaged in (b"", whole[:-1], b"x" + whole[1:]):
         file.write_bytes(damaged)
         assert files.read(b"recipe") is None
-    files = cache.Files(tmp_path / "missing")
+    files = jax_setup.Files(tmp_path / "missing")
     files.write(b"recipe", b"program")  # an obstacle is none
     assert files.read(b"recipe") is None
 
 
 @pytest.mark.skipif(os.name != "posix", reason="owners and modes are those of POSIX")
 def test_what_others_can_have_written_is_not_executed(tmp_path, monkeypatch):
-    files, before = cache.Files(tmp_path), os.umask(0)
+    files, before = jax_setup.Files(tmp_path), os.umask(0)
     try:
         files.write(b"recipe", b"program")
     finally:
@@ -238,7 +238,7 @@ def test_what_others_can_have_written_is_not_executed(tmp_path, monkeypatch):
 
 
 def test_many_write_at_once(tmp_path):
-    files, programs_ = cache.Files(tmp_path), [bytes([i]) * 100_000 for i in range(8)]
+    files, programs_ = jax_setup.Files(tmp_path), [bytes([i]) * 100_000 for i in range(8)]
     seen = set()
 
     def work(mine):
@@ -263,9 +263,9 @@ def test_the_oldest_are_forgotten(tmp_path):
 
 
 def test_programs_are_those_of_their_surroundings(tmp_path, monkeypatch):
-    cache.Files(tmp_path).write(b"recipe", b"program")
+    jax_setup.Files(tmp_path).write(b"recipe", b"program")
     monkeypatch.setenv("XLA_FLAGS", "--xla_cpu_enable_fast_math=true")
-    assert cache.Files(tmp_path).read(b"recipe") is None
+    assert jax_setup.Files(tmp_path).read(b"recipe") is None
 
 
 _SECOND = """

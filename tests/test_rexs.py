@@ -19,7 +19,7 @@ from jaxgear.microgeometry import AbstractCurve, AbstractModification, Tabulated
 from jaxgear.numerics import number
 from jaxgear.rexs import read_rexs, write_rexs
 from jaxgear.rexs.frame import frames
-from jaxgear.rexs.thickness import SPANS
+from jaxgear.rexs.gears import SPANS
 
 PINION = jg.Gear(
     teeth=19,

@@ -22,14 +22,15 @@ from design_texts import asked_sweep
 from report_page import assert_row, check_report
 
 import jaxgear as jg
-from jaxgear.cli import devices
+from jaxgear.cli import jax_setup
 from jaxgear.contact.status import Status
 from jaxgear.io import load_design, read_variants
 from jaxgear.metrics.findings import LIMITS
 from jaxgear.plot.figure import captioned
-from jaxgear.studies import evaluation, sweep_result
-from jaxgear.studies.progress import Stages
-from jaxgear.sweeps import SweepTable, evaluate
+from jaxgear.studies import evaluation
+from jaxgear.studies.study import Stages
+from jaxgear.sweeps import SweepTable
+from jaxgear.sweeps import run as sweep_run
 from jaxgear.sweeps.columns import Column, described
 
 SWEEPS = importlib.import_module("jaxgear.studies.sweep")
@@ -54,7 +55,7 @@ def folder(tmp_path_factory):
     os.environ["JAXGEAR_NO_CACHE"] = "1"
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(evaluation, "_TORQUES", 5)  # as in `test_cli`
-        patch.setattr(sweep_result, "CHOSEN", CHOSEN)
+        patch.setattr(SWEEPS, "CHOSEN", CHOSEN)
         result = call("sweep", folder / "gear.toml", "-o", folder / "out", "--best", "5", "--report")
     assert result.code == 0, result.err
     return folder, result
@@ -135,12 +136,12 @@ def test_pictures_show_every_variant_or_an_even_share(folder, tmp_path, monkeypa
         "transmission_error_orders",
         "k_chart",
     } < names  # of the best, for the report
-    monkeypatch.setattr(sweep_result, "_DRAWN", 20)
+    monkeypatch.setattr(SWEEPS, "_DRAWN", 20)
     drawn = {}
     pareto = captioned("")(lambda table: drawn.update(table) or plt.subplots()[1])
     monkeypatch.setattr("jaxgear.plot.pareto", pareto)
     table = jg.open_sweep(folder / "out" / "table")
-    for figure in sweep_result.figures_of(table):
+    for figure in SWEEPS.figures_of(table):
         plt.close(figure.figure)
     front = table.pareto(["ppte_um", "effective_contact_ratio"]).column("ppte_um")
     assert set(drawn[table.find("ppte")]) == {*table.column("ppte_um")[::3], *front}
@@ -182,13 +183,13 @@ def test_a_quick_sweep_is_coarse_short_and_says_so(folder, tmp_path, monkeypatch
 
 
 def test_failed_variants_are_loud(folder, tmp_path, monkeypatch):
-    evaluated = evaluate._evaluate_few
+    evaluated = sweep_run._evaluate_few
 
     def failed(*given):
         values, status = evaluated(*given)
         return values, np.full_like(status, Status.MORE_PAIRS_NEEDED)
 
-    monkeypatch.setattr(evaluate, "_evaluate_few", failed)
+    monkeypatch.setattr(sweep_run, "_evaluate_few", failed)
     (tmp_path / "gear.toml").write_text(SWEEP)
     result = sweep(tmp_path / "gear.toml", "-o", tmp_path / "out")
     assert result.code == 1 and "60 variants failed" in result.err
@@ -209,7 +210,7 @@ def test_a_slow_sweep_tells_how_far_it_is_before_the_next_tenth(monkeypatch):
 
 def test_interrupted_while_drawing_it_says_what_is_there(folder, monkeypatch):
     folder, _ = folder
-    monkeypatch.setattr(sweep_result, "figures_of", lambda *_: signal.raise_signal(signal.SIGINT))
+    monkeypatch.setattr(SWEEPS, "figures_of", lambda *_: signal.raise_signal(signal.SIGINT))
     result = call("sweep", folder / "gear.toml", "-o", folder / "out")
     line = f"all tables are complete in {folder / 'out'}{os.sep}, not all figures are drawn"
     assert result.code == 130 and result.err.splitlines()[-1] == f"jaxgear: interrupted, {line}"
@@ -359,18 +360,18 @@ def test_wrong_options_are_one_line(folder, arguments, fragment):
 
 def test_every_usable_core_becomes_a_device_unless_told_otherwise(monkeypatch):
     settings = {}
-    monkeypatch.setattr(devices.jax.config, "update", settings.__setitem__)
+    monkeypatch.setattr(jax_setup.jax.config, "update", settings.__setitem__)
     monkeypatch.delenv("JAX_NUM_CPU_DEVICES", raising=False)
     monkeypatch.setenv("XLA_FLAGS", "")
     for cores, wanted in ((1, 2), (2, 2), (48, 48)):
-        monkeypatch.setattr(devices, "usable_cores", lambda cores=cores: cores)
-        devices.use_all_cores()
+        monkeypatch.setattr(jax_setup, "usable_cores", lambda cores=cores: cores)
+        jax_setup.use_all_cores()
         assert settings.pop("jax_num_cpu_devices") == wanted
     monkeypatch.setenv("JAX_NUM_CPU_DEVICES", "3")
-    devices.use_all_cores()
+    jax_setup.use_all_cores()
     monkeypatch.delenv("JAX_NUM_CPU_DEVICES")
     monkeypatch.setenv("XLA_FLAGS", "--xla_force_host_platform_device_count=5")
-    devices.use_all_cores()
+    jax_setup.use_all_cores()
     assert not settings
 
 

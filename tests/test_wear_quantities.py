@@ -21,7 +21,7 @@ from jaxgear.wear import (
     wear,
     wear_depth,
 )
-from jaxgear.wear.quantities import number_of
+from jaxgear.wear.settings import number_of
 
 TORQUE = 100.0
 BLOCKS = 2  # everywhere, so that one program serves all lives

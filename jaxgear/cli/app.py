@@ -206,9 +206,9 @@ def _sweep(
     quick: Quick = False,
 ) -> dict[str, Any]:
     with interrupt.importing():
-        from . import devices
-    devices.use_all_cores()
-    devices.join_processes(coordinator, processes, process, automatic=distributed)
+        from . import jax_setup
+    jax_setup.use_all_cores()
+    jax_setup.join_processes(coordinator, processes, process, automatic=distributed)
     return {"samples": samples, "best": best, "quick": quick}
 
 

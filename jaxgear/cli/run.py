@@ -1,9 +1,10 @@
-"""The command of a study: asked for, worked out, put in place, printed."""
+"""Run a study as a command: stages of its progress, checkpoints, results, report."""
 
 import dataclasses
 import importlib
 import os
 import threading
+import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from functools import partial
@@ -11,16 +12,53 @@ from pathlib import Path
 from typing import Any
 
 import jax
+from rich import progress as bars
+from rich.progress import BarColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
+from .. import studies
 from ..io import DesignFile, load_design, result_folder
+from ..io.folder import earlier
 from ..numerics import compile_quickly
 from ..studies import AbstractStudy, Checkpoints, Progress
 from ..studies.study import AbstractStudyResult
 from ..studies.summary import save_figures, write_study_summary
 from . import interrupt, streams, terminal
-from .cache import enable_cache
 from .document import document
-from .progress import Stages
+from .jax_setup import enable_cache
+
+
+class Stages(bars.Progress, studies.Stages):
+    """Progress of a command through its stages."""
+
+    def __init__(self) -> None:
+        columns = TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[note]}")
+        console = terminal.console(stderr=True)
+        options: dict[str, Any] = {"console": console, "transient": True, "disable": not console.is_terminal}
+        bars.Progress.__init__(self, *columns, TimeElapsedColumn(), TimeRemainingColumn(), **options)
+        studies.Stages.__init__(self, self.shown)
+        self._began = time.perf_counter()
+        self._task = self.add_task("reading the design file", total=None, note="")
+
+    @property
+    def elapsed(self) -> float:
+        """Time since the start [s]."""
+        return time.perf_counter() - self._began
+
+    def shown(self, progress: Progress) -> None:
+        """Shows how far a study is; its callback."""
+        interrupt.check()
+        done, begins = progress.done or 0, progress.done is None
+        self.update(self._task, description=progress.stage, total=progress.total, completed=done, note=progress.note)
+        if begins and not self.console.is_terminal:
+            self.console.print(f"jaxgear: {progress.stage}", soft_wrap=True)
+
+    def replaces(self, target: Path) -> None:
+        """Says which earlier results a command is about to replace, as long as it can still be stopped."""
+        held = earlier(target)
+        if held:
+            line = f"jaxgear: replaces the results in {target}{os.sep} ({held}); --output keeps them"
+            self.console.print(line, soft_wrap=True)
+
 
 _FIGURES = ("matplotlib.pyplot",)
 

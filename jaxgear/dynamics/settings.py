@@ -1,18 +1,24 @@
-"""Settings of dynamics: speeds, masses, damping; and the quantities of steady vibration."""
+"""Settings of dynamics: speeds, masses, damping; and the quantities of steady vibration.
 
-from collections.abc import Callable, Sequence
+A quantity of dynamics needs speeds, masses and damping besides its name: `Dynamics.quantity` supplies them in Python,
+the table [dynamics] in a design file.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import Array, Bool, Float
 
 from ..contact import Mesh
 from ..geometry import GearPair
-from ..metrics import AbstractSettings
+from ..metrics import AbstractSettings, Analysis, Quantity, Vocabulary
 from ..microgeometry import AbstractModification
 from ..numerics import Given, concrete, count, number
+from ..numerics.reductions import Max
 from .force import AbstractMeshForce
 from .from_contact import Model, force_and_mesh
 from .oscillator import Oscillator
@@ -266,3 +272,50 @@ class Dynamics(AbstractSettings):
         steps = self.traced_steps
         runs = replace(self, steps=steps).runs(jax.lax.stop_gradient(oscillator))
         return differentiable(oscillator, tuple(runs.values()), steps)
+
+
+Numbers = Float[Array, "runs speeds"]
+
+_FIELDS = (
+    ("dynamic_factor", "", "largest mesh force over the static one"),
+    ("dte_rms", "um", "rms of the dynamic transmission error about its mean"),
+    ("contact_loss_share", "", "share of the time without contact, which has no derivative"),
+    ("back_side_contact", "", "share of the time on the coast flanks, which has no derivative"),
+)
+AT_SPEED = tuple(name for name, *_ in _FIELDS)  # at the speed of the operating point, the others at all of the settings
+
+
+def _numbers(field: str, at_speed: bool, analysis: Analysis, dynamics: Dynamics) -> Numbers:
+    """Values of a quantity for all runs and speeds, which the quantity reduces to the worst."""
+    # all quantities of the same settings come from one sweep
+    found, converged = analysis.once(dynamics, ("runs", at_speed), lambda: _swept(at_speed, analysis, dynamics))
+    # a map of contacts that were not found is no force
+    return jnp.where(converged, getattr(found, field), jnp.nan)
+
+
+def _swept(at_speed: bool, analysis: Analysis, dynamics: Dynamics) -> tuple[SteadyNumbers, Bool[Array, ""]]:
+    mesh, speed = analysis.prepared_mesh, analysis.operating_point.speed
+    if at_speed:
+        if speed is None:
+            raise ValueError("needs a speed, solve with OperatingPoint(torque, speed)")
+        frequency = mesh_frequency(mesh.pair.pinion.teeth, speed)
+        dynamics = replace(dynamics, mesh_frequencies=frequency[None])
+    torque, deviation = analysis.cycle.torque, analysis.deviation
+    oscillator, _ = dynamics.oscillator_and_mesh(mesh, torque, **analysis.flanks, deviation=deviation)
+    return dynamics.numbers(oscillator), oscillator.converged
+
+
+def mesh_frequency(teeth: Scalar, speed: Scalar) -> Scalar:
+    """Mesh frequency [Hz] of a gear by its speed [rpm]."""
+    return teeth * speed / 60
+
+
+def _quantities(at_speed: bool) -> Iterator[Quantity]:
+    for field, unit, meaning in _FIELDS:
+        name, where = (field, "the speed of the pinion") if at_speed else (f"worst_{field}", "its worst speed")
+        label = "largest dynamic factor" if name == "worst_dynamic_factor" else ""
+        of = partial(_numbers, field, at_speed)
+        yield Quantity(name, of, unit, f"{meaning}, at {where}", Max(), label=label, takes=Dynamics)
+
+
+DYNAMIC_QUANTITIES = Vocabulary((*_quantities(True), *_quantities(False)))

@@ -3,7 +3,7 @@
 from .estimate import Identified as Identified
 from .estimate import identify as identify
 from .estimate import period_of as period_of
-from .measured_te import read_measurement as read_measurement
 from .measurement import Measurement as Measurement
+from .measurement import read_measurement as read_measurement
 from .study import IdentificationResult as IdentificationResult
 from .study import IdentificationStudy as IdentificationStudy

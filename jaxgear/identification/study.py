@@ -23,13 +23,11 @@ from ..provided import provided
 from ..report import Figure, Record, Table, numbers_of, table_of
 from ..studies.checkpoints import Checkpoints
 from ..studies.evaluation import coarse
-from ..studies.progress import Stages
-from ..studies.study import AbstractStudy, AbstractStudyResult
+from ..studies.study import AbstractStudy, AbstractStudyResult, Stages
 from ..studies.summary import flanks_data
 from ..tolerance import ToleranceClass
 from .estimate import Identified, identify, period_of
-from .measured_te import read_measurement
-from .measurement import Measurement
+from .measurement import Measurement, read_measurement
 
 _OF_LIMIT = 3.0  # limit deviation over standard deviation: nearly all gears of a class keep its limits
 _OF_RANGE = 4.0  # range of a variable over standard deviation

@@ -24,7 +24,7 @@ from ..optimize.rounding import check_steps, multiples
 from ..tolerance import ManufacturedGears
 from ..vocabulary import quantity_of
 from ..wear import WEAR_QUANTITIES, Wear
-from ..wear.quantities import MOST_LIVES
+from ..wear.settings import MOST_LIVES
 from .design_file import DesignFile
 from .errors import DesignFileError, check_known, naming, refused, suggestion
 from .model_table import FINITE_ELEMENTS

@@ -12,11 +12,6 @@ from ..numerics.reductions import Range as Range
 from ..numerics.reductions import Rms as Rms
 from ..numerics.reductions import Value as Value
 from .analysis import Analysis as Analysis
-from .contact_lines import axial_force as axial_force
-from .contact_lines import contact_line_lengths as contact_line_lengths
-from .contact_lines import shuttling_moment as shuttling_moment
-from .contact_lines import tilting_moments as tilting_moments
-from .contact_lines import total_contact_ratio as total_contact_ratio
 from .excitation import Harmonics as Harmonics
 from .excitation import excited_by as excited_by
 from .excitation import force_excitation as force_excitation
@@ -58,8 +53,13 @@ from .lubrication import mesh_efficiency as mesh_efficiency
 from .lubrication import ohlendorf_loss_factor as ohlendorf_loss_factor
 from .lubrication import specific_film_thickness as specific_film_thickness
 from .mesh_quantities import MESH_QUANTITIES as MESH_QUANTITIES
+from .mesh_quantities import axial_force as axial_force
+from .mesh_quantities import contact_line_lengths as contact_line_lengths
 from .mesh_quantities import mean_removed_material as mean_removed_material
+from .mesh_quantities import shuttling_moment as shuttling_moment
 from .mesh_quantities import summary as summary
+from .mesh_quantities import tilting_moments as tilting_moments
+from .mesh_quantities import total_contact_ratio as total_contact_ratio
 from .quantity import AbstractSettings as AbstractSettings
 from .quantity import Quantity as Quantity
 from .quantity import Vocabulary as Vocabulary

@@ -8,10 +8,9 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..contact import MeshCycle
-from ..geometry import margins
-from ..numerics import UnitKey, over_batch
+from ..geometry import GearPair, margins, path_of_contact
+from ..numerics import UnitKey, over_batch, safe_divide
 from ..numerics.reductions import Average, Harmonic, Max, Min, Range, Rms
-from .contact_lines import axial_force, contact_line_lengths, shuttling_moment, tilting_moments, total_contact_ratio
 from .excitation import force_excitation, relative_transmission_error
 from .flank import max_relief, relief_reversal, removed_volume
 from .load_distribution import (
@@ -29,6 +28,57 @@ from .rating import LUBRICATED, RATED
 from .stress import nominal_contact_stress, nominal_root_stress, root_stress
 
 Scalar = Float[Array, ""]
+Curve = Float[Array, " positions"]
+
+
+@over_batch
+def total_contact_ratio(cycle: MeshCycle) -> Scalar:
+    """Total contact ratio eps_gamma = eps_alpha + eps_beta, sum of transverse contact ratio and overlap ratio."""
+    return cycle.kinematics.path_of_contact.contact_ratio + cycle.kinematics.pair.overlap_ratio
+
+
+def contact_line_lengths(pair: GearPair) -> tuple[Scalar, Scalar]:
+    """Least and mean total length of the theoretical contact lines of all pairs over the cycle [mm].
+
+        mean   b eps_alpha / cos(beta_b)
+        least  the mean less min(n_a n_b, (1 - n_a) (1 - n_b)) / eps_beta b / cos(beta_b)
+
+    with the fractional parts n_a of the transverse contact ratio and n_b of the overlap ratio. For spur gears the least
+    length is the face width times the integer part of the contact ratio.
+    """
+    transverse, overlap = path_of_contact(pair).contact_ratio, pair.overlap_ratio
+    beyond, over = transverse - jnp.floor(transverse), overlap - jnp.floor(overlap)
+    share = jnp.where(overlap < 1, 1.0, safe_divide(over, overlap))
+    less = jnp.minimum(beyond * share, safe_divide((1 - beyond) * (1 - over), overlap, default=1.0))
+    along = pair.face_width / jnp.cos(pair.pinion.base_helix_angle)
+    return along * (transverse - less), along * transverse
+
+
+@over_batch
+def axial_force(cycle: MeshCycle) -> Scalar:
+    """Axial force F_bt tan(abs(beta_b)) of the mesh [N], in opposite directions on pinion and wheel."""
+    return cycle.force * jnp.abs(cycle.kinematics.pair.path_slope)
+
+
+@over_batch
+def tilting_moments(cycle: MeshCycle) -> tuple[Scalar, Scalar]:
+    """Tilting moments F_ax r_w of the axial force on pinion and wheel, with their working pitch radii [N m]."""
+    pair, force = cycle.kinematics.pair, 1e-3 * axial_force(cycle)
+    secant = 1 / jnp.cos(pair.working_pressure_angle)
+    return force * pair.pinion.base_radius * secant, force * pair.wheel.base_radius * secant
+
+
+@over_batch
+def shuttling_moment(cycle: MeshCycle) -> Curve:
+    """Moment of the forces on the line of action about the middle of the common face, sum of q y dy [N m].
+
+    It is positive for a load at positive face coordinates. For helical gears it alternates while the contact lines pass
+    over the face, and excites the bearings.
+    """
+    of = cycle.kinematics
+    return 1e-3 * jnp.einsum("psn,s->n", cycle.line_load, of.face_coordinate * of.slice_width)
+
+
 Load = Float[Array, "pairs slices positions"]
 
 

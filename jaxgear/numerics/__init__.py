@@ -2,13 +2,13 @@
 
 from .batching import on_both as on_both
 from .batching import over_batch as over_batch
+from .complementarity import opening as opening
 from .complementarity import solve_contact as solve_contact
 from .complementarity import tangent_stiffness as tangent_stiffness
 from .contact_problem import AbstractSpring as AbstractSpring
 from .contact_problem import ContactProblem as ContactProblem
 from .contact_problem import ContactSolution as ContactSolution
 from .contact_problem import Known as Known
-from .contact_system import opening as opening
 from .conversion import Callback as Callback
 from .conversion import Frozen as Frozen
 from .conversion import Given as Given
@@ -24,6 +24,7 @@ from .dense import pivots as pivots
 from .dense import positive_definite as positive_definite
 from .dense import pseudo_inverse as pseudo_inverse
 from .dense import solve_dense as solve_dense
+from .durable import enable_cache as enable_cache
 from .fields import Checked as Checked
 from .fields import Number as Number
 from .fields import UnitKey as UnitKey
@@ -45,7 +46,6 @@ from .implicit import newton as newton
 from .implicit import rising_root as rising_root
 from .implicit import solve as solve
 from .implicit import with_jacobian as with_jacobian
-from .jax_cache import enable_cache as enable_cache
 from .pareto import decoded as decoded
 from .pareto import halton as halton
 from .pareto import next_generation as next_generation

@@ -5,10 +5,9 @@ from types import MappingProxyType
 
 from ..numerics import Callback
 from .free_form import FreeForm
-from .gradient_search import LBFGS, Adam
 from .iteration import TransmissionErrorIteration
 from .method import SLP, AbstractMethod
-from .population import CMAES, DifferentialEvolution, Factorial, Genetic
+from .other_methods import CMAES, LBFGS, Adam, DifferentialEvolution, Factorial, Genetic
 from .problem import Problem
 from .refine import POSITIONS
 from .result import Optimum

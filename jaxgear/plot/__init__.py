@@ -4,9 +4,6 @@ Every function draws into the Axes `ax`, or into a new figure of report size if 
 No function opens a window or changes the settings of matplotlib; `save` writes the file.
 """
 
-from .convergence import convergence as convergence
-from .convergence import iterations_relief as iterations_relief
-from .convergence import iterations_transmission_error as iterations_transmission_error
 from .dynamics import bifurcation as bifurcation
 from .dynamics import branches as branches
 from .dynamics import order_tracks as order_tracks
@@ -27,6 +24,9 @@ from .flank import line_load as line_load
 from .flank import plane_of_action as plane_of_action
 from .flank import pressure_map as pressure_map
 from .flank import topography as topography
+from .front import convergence as convergence
+from .front import iterations_relief as iterations_relief
+from .front import iterations_transmission_error as iterations_transmission_error
 from .front import optimum_front as optimum_front
 from .front import parallel_coordinates as parallel_coordinates
 from .front import pareto as pareto

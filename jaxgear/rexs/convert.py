@@ -12,8 +12,7 @@ from ..geometry import GearPair
 from ..io import DesignFileError, load_design, write_design
 from ..io.toml import read
 from ..report import Table
-from .read import read_rexs
-from .stages import RexsStage, rexs_stages
+from .read import RexsStage, read_rexs, rexs_stages
 from .write import write_rexs
 
 _REXS, _DESIGN = (".rexs", ".xml", ".rexsj", ".json", ".rexsz", ".zip"), (".toml",)

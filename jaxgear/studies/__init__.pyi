@@ -15,18 +15,18 @@ from .evaluation import evaluation_of as evaluation_of
 from .export import ExportResult as ExportResult
 from .export import ExportStudy as ExportStudy
 from .optimization_result import OptimizationResult as OptimizationResult
-from .progress import Progress as Progress
-from .progress import Stages as Stages
 from .revolution import RevolutionResult as RevolutionResult
 from .revolution import RevolutionStudy as RevolutionStudy
 from .study import AbstractStudy as AbstractStudy
 from .study import AbstractStudyResult as AbstractStudyResult
+from .study import Progress as Progress
+from .study import Stages as Stages
 from .summary import study_summary as study_summary
 from .summary import write_results as write_results
+from .sweep import SweepResult as SweepResult
 from .sweep import SweepStudy as SweepStudy
-from .sweep_result import SweepResult as SweepResult
+from .wear import WearResult as WearResult
 from .wear import WearStudy as WearStudy
-from .wear_result import WearResult as WearResult
 from .wear_scatter import manufactured_wear as manufactured_wear
 
 __all__: list[str]

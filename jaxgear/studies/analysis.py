@@ -31,8 +31,7 @@ from .comparison import Modifications, rule_based
 from .comparison_result import ComparisonResult
 from .evaluation import Evaluation, coarse, evaluation_of, torques_of
 from .optimization_result import COMPROMISE, OptimizationResult
-from .progress import Stages
-from .study import AbstractStudy
+from .study import AbstractStudy, Stages
 
 
 class ComparisonRun:

@@ -15,7 +15,7 @@ from ..optimize import Front, Optimum
 from ..sizing import iso_relief
 from .checkpoints import Checkpoints, NamedArrays
 from .evaluation import coarse
-from .progress import Stages
+from .study import Stages
 
 Modifications = tuple[AbstractModification, AbstractModification]
 

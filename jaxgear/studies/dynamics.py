@@ -31,8 +31,7 @@ from ..io.errors import naming
 from .checkpoints import Checkpoints, SpeedResponses
 from .comparison import Modifications, compared, search_of
 from .dynamics_result import DynamicsResult, next_to_design, peak
-from .progress import Stages
-from .study import AbstractStudy
+from .study import AbstractStudy, Stages
 
 _QUICK_SPEEDS = 24
 _POINTS = 400  # of a branch

@@ -15,8 +15,7 @@ from ..report import Table
 from .checkpoints import Checkpoints
 from .comparison import Modifications, compared, search_of
 from .evaluation import torques_of
-from .progress import Stages
-from .study import AbstractStudy, AbstractStudyResult
+from .study import AbstractStudy, AbstractStudyResult, Stages
 from .summary import flanks_data
 
 _QUICK_POSITIONS = 64  # of the force map

@@ -20,8 +20,7 @@ from ..revolution.solve import GEARS
 from ..vocabulary import quantity_of
 from .checkpoints import Checkpoints
 from .comparison import compared, search_of
-from .progress import Stages
-from .study import AbstractStudy, AbstractStudyResult
+from .study import AbstractStudy, AbstractStudyResult, Stages
 from .summary import flanks_data
 
 _PANEL = 62.0  # height [mm]

@@ -16,7 +16,7 @@ from ..numerics import Quantile, UnitKey, program, real
 from ..report import Figure, Record, Table, table_of
 from ..tolerance import ManufacturedGears
 from ..wear import WEAR_QUANTITIES, Wear
-from ..wear.quantities import MOST_LIVES, number_of
+from ..wear.settings import MOST_LIVES, number_of
 from . import manufactured
 from .checkpoints import Checkpoints, NamedArrays
 

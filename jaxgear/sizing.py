@@ -1,20 +1,17 @@
-"""Rules that size a tip relief.
+"""Rules of standards and papers that size a modification from the load: they evaluate formulas and search nothing."""
 
-References:
-    ISO 6336-1:2006/2019, Method B (single stiffness c', clause 9) and the optimum relief in its dynamic factor K_v;
-    ISO/TR 13989-1 and ISO/TS 6336-20, equation B.1; ISO 21771 for relief lengths.
-"""
+from typing import Literal
 
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ..compliance import iso_stiffness
-from ..compliance.iso_6336 import single_stiffness
-from ..contact import MeshCycle
-from ..geometry import GearPair, PathOfContact, path_of_contact
-from ..metrics import secant_stiffness
-from ..microgeometry import AbstractCurve, TipRelief
-from ..numerics import Given, check, minimum, real, safe_divide
+from .compliance import iso_stiffness
+from .compliance.iso_6336 import single_stiffness
+from .contact import MeshCycle
+from .geometry import GearPair, PathOfContact, path_of_contact
+from .metrics import secant_stiffness
+from .microgeometry import AbstractCurve, TipRelief
+from .numerics import Given, check, minimum, real, safe_divide
 
 Scalar = Float[Array, ""]
 
@@ -143,3 +140,79 @@ def _line_load(pair: GearPair, torque: Given, application_factor: Given) -> Scal
 def _over(load: Scalar, stiffness: Scalar) -> Scalar:
     """Deflection [um]; the stiffness of the standard vanishes with the load, but more slowly."""
     return load / jnp.maximum(stiffness, jnp.finfo(load.dtype).tiny)
+
+
+Kind = Literal["through_hardened", "surface_hardened", "stiff"]
+
+# ranges of the annex [um]
+_CROWNING = (10.0, 40.0)
+_STIFF_CROWNING = (10.0, 25.0)
+
+
+def equivalent_misalignment(helix_tolerance: Given, shaft_deflection: Given) -> Scalar:
+    """F_betax_cv = f_sh + 1.5 f_Hbeta [um over the face width], the misalignment that crowning and end relief are for.
+
+    Args:
+        helix_tolerance: f_Hbeta, helix slope tolerance [um].
+        shaft_deflection: f_sh, misalignment by elastic deflections of shafts and gears [um over the face width].
+    """
+    check("helix_tolerance", helix_tolerance, "um", low=0.0)
+    check("shaft_deflection", shaft_deflection, "um", low=0.0)
+    return real(shaft_deflection) + 1.5 * real(helix_tolerance)
+
+
+def crowning_for_misalignment(misalignment: Given, *, limited: bool = False) -> Scalar:
+    """C_beta = 0.5 F_betax [um] (ISO 6336-1 Annex B; the genetic-algorithm study of the 19/48 pair calls it C_c).
+
+    Args:
+        misalignment: F_betax [um over the face width], for example `equivalent_misalignment`.
+        limited: whether to keep to the range of the annex, 10 to 40 um.
+    """
+    check("misalignment", misalignment, "um", low=0.0)
+    amount = 0.5 * real(misalignment)
+    return jnp.clip(amount, *_CROWNING) if limited else amount
+
+
+def crowning_for_tolerance(helix_tolerance: Given, *, limited: bool = False) -> Scalar:
+    """C_beta = f_Hbeta [um], where shafts are stiff or a helix modification compensates their deflection.
+
+    ISO 6336-1 Annex B; also equation 1 of the study of a three-step sizing of modifications, which applies it to both
+    gears, on top of what the deflections need and without the range of the annex.
+
+    Args:
+        helix_tolerance: f_Hbeta, helix slope tolerance [um].
+        limited: whether to keep to the range of the annex, 10 to 25 um.
+    """
+    check("helix_tolerance", helix_tolerance, "um", low=0.0)
+    amount = real(helix_tolerance)
+    return jnp.clip(amount, *_STIFF_CROWNING) if limited else amount
+
+
+def end_relief_amount(
+    helix_tolerance: Given, shaft_deflection: Given = 0.0, *, kind: Kind = "surface_hardened"
+) -> Scalar:
+    """C_beta I and II [um] of ISO 6336-1 Annex B, for each end of the face.
+
+    f_sh + 1.5 f_Hbeta for through-hardened teeth, half of it for surface-hardened ones, f_Hbeta for "stiff" gears.
+
+    Args:
+        helix_tolerance: f_Hbeta, helix slope tolerance [um].
+        shaft_deflection: f_sh [um over the face width]; without influence on "stiff".
+        kind: "through_hardened", "surface_hardened", or "stiff": stiff shafts or a compensated deflection.
+
+    Raises:
+        ValueError: for another kind, or a value out of its range.
+    """
+    whole = equivalent_misalignment(helix_tolerance, shaft_deflection)
+    if kind == "through_hardened":
+        return whole
+    if kind == "surface_hardened":
+        return 0.5 * whole
+    if kind == "stiff":
+        return real(helix_tolerance)
+    raise ValueError(f'kind = {kind!r} must be "through_hardened", "surface_hardened" or "stiff"')
+
+
+def end_relief_length(pair: GearPair) -> Scalar:
+    """Width of each end relief [mm], the smaller of 0.1 b and 1.0 m_n (ISO 6336-1 Annex B)."""
+    return jnp.minimum(0.1 * pair.face_width, pair.pinion.module)
