@@ -14,7 +14,9 @@ and so on:
 The place of an entry is imported when a file, a quantity or a command is first asked for, not with the package.
 """
 
+import functools
 import tomllib
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -29,14 +31,18 @@ def provided(group: str) -> dict[str, Any]:
     """
     from importlib import metadata  # imported when asked for: it takes longer than the commands need
 
-    own: dict[str, Any] = {}
-    for file in sorted(Path(__file__).parent.glob("*/application.toml")):
-        for name, place in tomllib.loads(file.read_text(encoding="utf-8")).get(group, {}).items():
-            own[name] = metadata.EntryPoint(name, place, f"jaxgear.{group}")
+    own = {name: metadata.EntryPoint(name, place, f"jaxgear.{group}") for name, place in _of_folders(group)}
     others = metadata.entry_points(group=f"jaxgear.{group}")
-    return own | {entry.name: entry for entry in others if entry.name not in own and not _deleted(entry.value)}
+    return own | {entry.name: entry for entry in others if entry.name not in own}
 
 
-def _deleted(place: str) -> bool:
-    package, *folders = place.partition(":")[0].split(".")
-    return package == __package__ and not Path(__file__).parent.joinpath(*folders[:1]).exists()
+def _of_folders(group: str) -> Iterator[tuple[str, str]]:
+    for application in _applications():
+        yield from application.get(group, {}).items()
+
+
+@functools.cache
+def _applications() -> tuple[dict[str, Any], ...]:
+    """What every `application.toml` of this package says."""
+    files = sorted(Path(__file__).parent.glob("*/application.toml"))
+    return tuple(tomllib.loads(file.read_text(encoding="utf-8")) for file in files)

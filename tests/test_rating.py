@@ -8,10 +8,11 @@ from rated_pairs import FZG_C, STAGE_3, rated, unlimited, with_rating
 
 import jaxgear as jg
 from jaxgear.contact.status import Status
+from jaxgear.metrics import SNLine
 from jaxgear.numerics import changed, quick_jit
 from jaxgear.rating import GearRating, Rating, mesh_geometry, rate, rating_findings
 from jaxgear.rating.flank import flank_factors
-from jaxgear.rating.life import SNLine, equivalent_torque, safety
+from jaxgear.rating.life import equivalent_torque, safety
 from jaxgear.rating.load_factors import (
     constants_of,
     factor_of,
@@ -203,6 +204,16 @@ def test_worked_spectrum_with_factors_held():
     grown = found.root_lines[0].damage(bending.safety[0] * spectrum.root_stress[0], spectrum.cycles[0])
     assert float(jnp.sum(grown)) == pytest.approx(1.0, rel=1e-6)
     assert float(found.life[0]) == pytest.approx(500.0 / float(bending.damage[0]), rel=1e-6)
+
+
+def test_static_strength_is_compared_with_the_load_without_application_factor():
+    """K_A of 1 and more: the torque of a single load is the largest; only K_v and K_Halpha change with K_A."""
+    given = {"dynamic_factor": 1.1, "transverse_load_factor": 1.1}
+    none, twice = (rated(with_rating(STAGE_3, application_factor=factor, **given)) for factor in (1.0, 2.0))
+    for way, steps in ((none.pitting, 2), (none.bending, 1)):
+        other = twice.pitting if steps == 2 else twice.bending
+        assert np.allclose(other.static_safety, way.static_safety, rtol=1e-12)
+        assert np.allclose(other.safety, way.safety / 2 ** (1 / steps), rtol=1e-12)
 
 
 def test_safety_of_a_single_bin_is_that_of_the_line():

@@ -20,6 +20,7 @@ from jaxgear.io.named_quantities import quantity_named
 from jaxgear.numerics import changed, real
 from jaxgear.rating import rate, report
 from jaxgear.rating.chain import Spectrum
+from jaxgear.rating.figures import woehler
 from jaxgear.rating.thermal import thermal_rating
 from jaxgear.report import write_report, write_tables
 from jaxgear.studies.comparison_result import ComparisonResult
@@ -96,11 +97,16 @@ def test_unknown_is_a_dash_and_no_number(rated):
     assert lines["P_VZ0"][3] == "" and lines["P_VZ0"][-1] == "estimate"
 
 
-def test_spectrum_tables_sum_to_the_damage(rated):
+@pytest.fixture
+def spectrum(rated):
+    """Of three loads with damages in proportion to their stresses."""
     bins, stress = jnp.array([3.0, 2.0, 1.0]), jnp.array([[900.0, 600.0, 300.0], [800.0, 500.0, 200.0]])
     factors = jax.tree.map(lambda number: jnp.stack([number] * 3), rated[0].factors)
     damage = stress / 4000
-    spectrum = Spectrum(bins, bins, 1e6 * stress, factors, stress, stress, damage, damage, bins[:2], bins[:2])
+    return Spectrum(bins, bins, 1e6 * stress, factors, stress, stress, damage, damage, bins[:2], bins[:2])
+
+
+def test_spectrum_tables_sum_to_the_damage(spectrum):
     load, stressed = report.spectrum_tables(spectrum)
     assert load.rows[0] == ("1", "3", "3", "900", "800", "1.092", "1.150", "1.069")
     assert [row[2] for row in stressed.rows] == ["0.2250", "0.1500", "0.0750"]
@@ -108,13 +114,28 @@ def test_spectrum_tables_sum_to_the_damage(rated):
 
 
 def test_page_workbook_and_lines(rated, tmp_path):
-    part = report.part(*rated, "unmodified")
+    part = report.part(*rated, "unmodified", coast=True)
+    assert part.chapters[0].lines[0].endswith("coast flanks are rated, which carry the negative torque.")
     write_report(tmp_path / "report.html", "stage 3", "rating", [], part.chapters)
     page = (tmp_path / "report.html").read_text("utf-8")
     assert "sigma_HG" in page and "S_lambda, micropitting, method B" in page
     write_tables(tmp_path / "rating.xlsx", [("design file", "small")], part.chapters[0].tables)
     assert (tmp_path / "rating.xlsx").read_bytes().startswith(b"PK")
     assert part.lines[0][:3] == ("table", "symbol", "meaning") and all(len(line) == 7 for line in part.lines)
+
+
+def test_woehler_figure_has_every_load_at_its_place(rated, spectrum):
+    """Of a spectrum all marks, and numbers from 1 % of the damage sum on; of a single load its own."""
+    none = replace(spectrum, pitting_damage=spectrum.pitting_damage.at[0].set(jnp.array([0.5, 0.004, 0.0])))
+    for found, marks, texts in ((replace(rated[0], spectrum=none), 3, ["0.5"]), (rated[0], 1, None)):
+        first, *others = woehler(found)
+        line, _, does, idle = first.get_lines()
+        assert np.allclose(line.get_ydata()[1:-1], found.flank_lines[0].stress)
+        assert len(does.get_xdata()) + len(idle.get_xdata()) == marks
+        if texts is not None:
+            assert [text.get_text() for text in first.texts] == texts and len(others[0].texts) == 3
+            assert np.allclose(does.get_ydata(), [900.0, 600.0]) and np.allclose(does.get_xdata(), [9e8, 6e8])
+        assert others[1].get_ylabel() == r"stress $\sigma_F$ [MPa]" and others[2].get_xlabel() == "load cycles [-]"
 
 
 SMALL = """

@@ -75,6 +75,7 @@ from .safety import pressure_safety as pressure_safety
 from .safety import root_damage as root_damage
 from .safety import root_safety as root_safety
 from .safety import scuffing_safety as scuffing_safety
+from .sn_line import SNLine as SNLine
 from .stress import ContactStress as ContactStress
 from .stress import NominalRootStress as NominalRootStress
 from .stress import RootFactors as RootFactors

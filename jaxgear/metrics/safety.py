@@ -1,8 +1,8 @@
 """Safety factors, permissible over occurring stress, temperature or film, and damage by a load.
 
-Palmgren and Miner: every cycle at a stress adds 1 / N to the damage sum, N = N_0 (sigma_0 / sigma)^p. The mean over a
-load spectrum, whose weights are shares of the revolutions, is the damage sum of 1e6 revolutions of the pinion; the life
-is 1e6 / damage revolutions.
+Palmgren and Miner: every cycle at a stress adds 1 / N of its `SNLine` to the damage sum. The mean over a load spectrum,
+whose weights are shares of the revolutions, is the damage sum of 1e6 revolutions of the pinion; the life is 1e6 over
+that.
 
 References:
     ISO 6336-6 (load spectra); ISO 6336-2 and -3 for the nominal stresses.
@@ -18,6 +18,7 @@ from ..numerics import Checked, number, over_batch
 from .lubricant import Lubricant
 from .lubrication import contact_temperature, specific_film_thickness
 from .quantity import AbstractSettings
+from .sn_line import SNLine
 from .stress import nominal_contact_stress, nominal_root_stress, root_stress
 
 Real = Float[Array, "..."]
@@ -207,8 +208,16 @@ def damage_per_cycle(strength: Strength, name: Mode, stresses: tuple[Real, Real]
         ValueError: for a strength without that S-N curve.
     """
     factor = _stress_factor(strength, name)
+    pinion, wheel = (line.damage(factor * stress, 1.0) for line, stress in zip(sn_lines(strength, name), stresses))
+    return pinion, wheel
+
+
+def sn_lines(strength: Strength, name: Mode) -> tuple[SNLine, SNLine]:
+    """S-N lines of pinion and wheel, power laws without an endurance limit.
+
+    Raises:
+        ValueError: for a strength without that S-N curve.
+    """
     curves = zip(*(strengths_of(strength, each) for each in (name, f"{name}_exponent", f"{name}_cycles")))
-    pinion, wheel = (
-        (factor * stress / limit) ** exponent / cycles for stress, (limit, exponent, cycles) in zip(stresses, curves)
-    )
+    pinion, wheel = (SNLine.power_law(limit, cycles, exponent) for limit, exponent, cycles in curves)
     return pinion, wheel

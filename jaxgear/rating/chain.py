@@ -7,13 +7,14 @@ from jaxtyping import Array, Float
 
 from ..conditions import LoadSpectrum
 from ..geometry import GearPair, PathOfContact, path_of_contact
+from ..metrics import SNLine
 from ..metrics.safety import safety_factor
 from ..numerics import Checked, Given, check, on_both, program, result
-from .flank import FlankFactors, flank_factors, flank_life_factors, flank_lines
-from .life import SNLine, equivalent_torque, safety
+from .flank import FlankFactors, flank_factors, flank_strengths
+from .life import equivalent_torque, safety
 from .load_factors import LoadFactors, load_factors
 from .mesh_geometry import MeshGeometry, mesh_geometry
-from .root import BendingFactors, bending_factors, bending_life_factors, bending_lines
+from .root import BendingFactors, bending_factors, root_strengths
 from .settings import Rating, check_metal
 
 Scalar = Float[Array, ""]
@@ -36,7 +37,7 @@ class Verdict(Checked):
         static_limit: of static strength.
         permissible: limit over required safety.
         safety: S_H or S_F, on the stress; of a spectrum the factor on all stresses for a damage sum of 1.
-        static_safety: static strength over the largest stress.
+        static_safety: static strength over the largest stress, without K_A: the torque is that of the largest load.
         damage: damage sum at the required life.
         power: that may be transmitted with the required safety.
     """
@@ -162,7 +163,8 @@ def _rate(
     factors = load_factors(pair, geometry, torque, speed, rating, **given)
     flank = flank_factors(pair, path, geometry, speed, rating)
     root = bending_factors(pair, path, geometry, rating)
-    lines = flank_lines(flank, rating), bending_lines(root, rating)
+    strengths = flank_strengths(flank, rating), root_strengths(root, rating)
+    lines = strengths[0].lines(rating.long_life_factor), strengths[1].lines(rating.long_life_factor)
     spectrum = None
     if rating.loads is not None:
         spectrum = _spectrum(pair, geometry, rating, rating.loads, (flank, root), lines, given)
@@ -170,10 +172,11 @@ def _rate(
     nominal = jnp.stack([flank.nominal_stress(geometry, torque)] * 2), root.nominal_stress(geometry, torque)
     stresses = flank.single_pair * nominal[0] * jnp.sqrt(factors.flank), nominal[1] * factors.root
     required = rating.required_pitting_safety, rating.required_root_safety
-    life_factors = flank_life_factors(rating, cycles[0]), bending_life_factors(rating, cycles[1])
+    life_factors = [of.life_factors(at, rating.long_life_factor) for of, at in zip(strengths, cycles)]
     power = torque * speed * jnp.pi / 30 * 1e-3
+    common = factors.application, power, spectrum
     verdicts = [
-        _verdict(of, nominal[of], stresses[of], life_factors[of], lines[of], cycles[of], required[of], power, spectrum)
+        _verdict(of, nominal[of], stresses[of], life_factors[of], lines[of], cycles[of], required[of], *common)
         for of in (0, 1)
     ]
     return PairRating(
@@ -211,17 +214,17 @@ def _cycles(
     return flank, root
 
 
-def _verdict(of, nominal, stress, life, lines, cycles, required, power, spectrum) -> Verdict:
+def _verdict(of, nominal, stress, life, lines, cycles, required, application, power, spectrum) -> Verdict:
+    steps = (_STEPS, 1)[of]
     limit = jnp.stack([line.bears(count) for line, count in zip(lines, cycles)])
     static = jnp.stack([line.stress[0] for line in lines])
-    reached, largest = safety_factor(limit, stress), stress
+    reached, largest = safety_factor(limit, stress), stress / application ** (1 / steps)
     damage = jnp.stack([line.damage(*each) for line, *each in zip(lines, stress, cycles)])
     if spectrum is not None:
         in_bins = (spectrum.contact_stress, spectrum.root_stress)[of]
         largest = jnp.max(in_bins, axis=1)
         reached = jnp.stack(on_both(lambda of_gear: safety(*of_gear), *zip(lines, in_bins, spectrum.cycles)))
         damage = jnp.sum((spectrum.pitting_damage, spectrum.root_damage)[of], axis=1)
-    on_torque = (reached / required) ** (_STEPS if of == 0 else 1)
     return Verdict(
         nominal_stress=nominal,
         stress=stress,
@@ -232,7 +235,7 @@ def _verdict(of, nominal, stress, life, lines, cycles, required, power, spectrum
         safety=reached,
         static_safety=safety_factor(static, largest),
         damage=damage,
-        power=power * on_torque,
+        power=power * (reached / required) ** steps,
     )
 
 

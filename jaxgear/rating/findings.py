@@ -78,7 +78,7 @@ def _of_mesh(rating: Rating, found: PairRating) -> Iterator[Finding]:
 
 def _of_gears(pair: GearPair, rating: Rating, found: PairRating) -> Iterator[Finding]:
     for of, (where, gear, settings) in enumerate(zip(("pinion", "wheel"), pair.gears, rating.gears)):
-        yield _finding("flank roughness Rz", settings.flank_roughness[0], where)
+        yield _finding("flank roughness Rz", settings.roughness, where)
         if settings.root_roughness_rz is not None:
             yield _finding("root roughness Rz", settings.root_roughness_rz, where)
         yield _finding("notch parameter q_s", found.root.notch[of], where)

@@ -10,7 +10,7 @@ from jaxtyping import Array, Float
 from ..geometry import GearPair, PathOfContact
 from ..metrics.stress import contact_factor_squares
 from ..numerics import Checked, Given, result
-from .life import SNLine, life_factor, strength_line
+from .life import Strengths
 from .materials import PITTING_PERMITTED, Knees
 from .mesh_geometry import MeshGeometry
 from .settings import GearRating, Rating
@@ -91,7 +91,7 @@ def flank_factors(
     on_speed = on_film + _VELOCITY_ABOVE
     velocity = geometry.reference_speed(speed)
     radius = geometry.reduced_radius(jnp.zeros_like(overlap))
-    first, second = (gear.flank_roughness[0] for gear in rating.gears)
+    first, second = (gear.roughness for gear in rating.gears)
     relative = 0.5 * (first + second) * (_REFERENCE_RADIUS / radius) ** (1 / 3)
     hardening = [_work_hardening(of, geometry, rating, radius, velocity) for of in (0, 1)]
     return FlankFactors(
@@ -130,7 +130,7 @@ def _work_hardening(
     if mate.group.kind.hardened:
         hardness = jnp.clip(_hardness(gear), *_WORK_HARDENING) - _WORK_HARDENING[0]
         assert rating.lubricant is not None
-        hard, soft = mate.flank_roughness[0], gear.flank_roughness[0]
+        hard, soft = mate.roughness, gear.roughness
         film = (rating.lubricant.viscosity_40 * velocity / 1500) ** -0.33
         roughness = hard * (_REFERENCE_RADIUS / radius) ** 0.33 * (hard / soft) ** 0.66 * film
         factor = (1.2 - hardness / 1700) * (_SMOOTH / jnp.clip(roughness, _SMOOTH, _ROUGHEST)) ** 0.15
@@ -151,40 +151,21 @@ def _hardness(gear: GearRating) -> Scalar:
     return gear.hardness
 
 
-def flank_knees(gear: GearRating, rating: Rating) -> Knees:
-    """Load cycles and life factors Z_NT of a gear.
+def flank_strengths(factors: FlankFactors, rating: Rating) -> Strengths:
+    """Limits, knees and factors of the permissible contact stress.
 
     Raises:
         ValueError: where pitting is permitted on a material that bears none.
     """
+    limits = jnp.stack([gear.pitting_strength for gear in rating.gears])
+    pinion, wheel = (_knees(gear, rating) for gear in rating.gears)
+    return Strengths(limits, (pinion, wheel), factors.reference, factors.static_work_hardening)
+
+
+def _knees(gear: GearRating, rating: Rating) -> Knees:
     knees = gear.group.kind.flank
     if not rating.pitting_permitted:
         return knees
     if knees[-1][0] < _PERMITTING:
         raise ValueError(f"pitting_permitted has no S-N line for {gear.heat_treatment} gears")
     return PITTING_PERMITTED
-
-
-def flank_lines(factors: FlankFactors, rating: Rating) -> tuple[SNLine, SNLine]:
-    """S-N lines of pinion and wheel for the contact stress."""
-    pinion, wheel = (
-        strength_line(
-            gear.pitting_strength,
-            flank_knees(gear, rating),
-            factors.reference[of],
-            factors.static_work_hardening[of],
-            rating.long_life_factor,
-        )
-        for of, gear in enumerate(rating.gears)
-    )
-    return pinion, wheel
-
-
-def flank_life_factors(rating: Rating, cycles: OfGears) -> OfGears:
-    """Z_NT of both gears at their load cycles."""
-    return jnp.stack(
-        [
-            life_factor(flank_knees(gear, rating), cycles[of], rating.long_life_factor)
-            for of, gear in enumerate(rating.gears)
-        ]
-    )

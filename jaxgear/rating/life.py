@@ -1,18 +1,21 @@
-"""S-N lines of ISO 6336, and load spectra after ISO 6336-6 (Palmgren and Miner).
+"""S-N lines of the materials of ISO 6336, and load spectra after ISO 6336-6 (Palmgren and Miner).
 
 References:
     ISO 6336-2 and -3 (life factors), ISO 6336-6:2006 with its Annex A (equivalent torque).
 """
 
+from typing import NamedTuple
+
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ..numerics import Checked, Given, real, result, safe_divide
+from ..metrics import SNLine
+from ..numerics import Given, safe_divide
 from .materials import LONG_LIFE, Knees
 
 Scalar = Float[Array, ""]
-Real = Float[Array, "..."]
+OfGears = Float[Array, " gears"]
 Bins = Float[Array, " bins"]
 Points = Float[Array, " points"]
 
@@ -20,38 +23,29 @@ _BEYOND = 8.0  # logarithm of a stress over the static strength that one cycle d
 _BISECTIONS = 60
 
 
-class SNLine(Checked):
-    """Bearable stress over load cycles, straight between points on logarithmic scales.
+class Strengths(NamedTuple):
+    """What both gears of a pair bear in one way to fail, pinion first.
 
     Attributes:
-        cycles: of static strength, endurance limit and 1e10 cycles, and between them.
-        stress: borne for so many cycles; the first is borne for fewer cycles too, the last for ever.
+        limits: sigma_Hlim or sigma_Flim, endurance limits of the materials [MPa].
+        knees: load cycles and life factors of the materials.
+        reference: product of the other factors for endurance, in ISO 6336-2 Z_L Z_v Z_R Z_W Z_X.
+        static: the same for static strength.
     """
 
-    cycles: Float[Array, " points"] = result()
-    stress: Float[Array, " points"] = result("MPa")
+    limits: OfGears
+    knees: tuple[Knees, Knees]
+    reference: OfGears
+    static: OfGears
 
-    def bears(self, cycles: Given) -> Real:
-        """Stress [MPa] that is borne for a number of load cycles."""
-        return jnp.exp(jnp.interp(jnp.log(real(cycles)), jnp.log(self.cycles), jnp.log(self.stress)))
+    def lines(self, long_life: Scalar) -> tuple[SNLine, SNLine]:
+        """S-N lines; `long_life` is the life factor at 1e10 cycles."""
+        pinion, wheel = (strength_line(*of, long_life) for of in zip(*self))
+        return pinion, wheel
 
-    def log_cycles(self, stress: Given) -> Real:
-        """Logarithm of the load cycles that a stress [MPa] is borne for; infinite below the line.
-
-        Above the static strength the line goes on, so that no stress is borne for nothing.
-        """
-        at, cycles, stresses = jnp.log(real(stress)), jnp.log(self.cycles), jnp.log(self.stress)
-        found = jnp.full_like(at, jnp.inf)
-        for i in reversed(range(len(cycles) - 1)):
-            exponent = safe_divide(cycles[i + 1] - cycles[i], stresses[i] - stresses[i + 1])
-            found = jnp.where(at > stresses[i + 1], cycles[i] + exponent * (stresses[i] - at), found)
-        return found
-
-    def damage(self, stress: Given, cycles: Given) -> Real:
-        """Share of the life that load cycles at a stress [MPa] take; none below the line."""
-        lasts = self.log_cycles(stress)
-        none = jnp.isinf(lasts)
-        return jnp.where(none, 0.0, cycles * jnp.exp(-jnp.where(none, 0.0, lasts)))
+    def life_factors(self, cycles: OfGears, long_life: Scalar) -> OfGears:
+        """Z_NT or Y_NT at the load cycles of both gears; `long_life` at 1e10."""
+        return jnp.stack([life_factor(knees, at, long_life) for knees, at in zip(self.knees, cycles)])
 
 
 def life_factor(knees: Knees, cycles: Scalar, long_life: Scalar) -> Scalar:

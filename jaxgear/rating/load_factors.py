@@ -44,6 +44,8 @@ _RUN_IN_HARD = 0.075, 3.0
 _RUN_IN_CAST = 0.275, 22.0, 11.0
 _RUN_IN_SOFT = 160.0, 12_800.0, 6400.0  # over sigma_Hlim [MPa]
 _SLOW, _FAST = 5.0, 10.0  # [m/s]
+# C_ay = ((sigma_Hlim / a - b)^2 / c + d) um of ISO 6336-1
+_RUN_IN_RELIEF = 97.0, 18.45, 18.0, 1.5
 
 
 class LoadFactors(Checked):
@@ -274,6 +276,13 @@ def run_in(gear: GearRating, deviation: Scalar, velocity: Scalar) -> Scalar:
 def _mean_run_in(rating: Rating, deviation: Scalar, velocity: Scalar) -> Scalar:
     first, second = (run_in(gear, deviation, velocity) for gear in rating.gears)
     return 0.5 * (first + second)
+
+
+def running_in_relief(rating: Rating) -> Scalar:
+    """C_ay [um], tip relief that running in makes: the mean of both materials."""
+    per, least, divisor, offset = _RUN_IN_RELIEF
+    limits = jnp.stack([gear.pitting_strength for gear in rating.gears])
+    return jnp.mean((limits / per - least) ** 2 / divisor + offset)
 
 
 def reduced_mass(pair: GearPair, geometry: MeshGeometry, rating: Rating) -> Scalar:

@@ -5,12 +5,13 @@ beside the print of another program: factors with three decimals, stresses and s
 """
 
 from collections.abc import Iterator, Sequence
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..report import Chapter, Part, Table
-from .chain import PairRating, Spectrum
+from ..report import Chapter, Figure, Part, Table
+from .chain import PairRating, Spectrum, Verdict
 from .load_sharing import POINTS
 from .settings import Rating
 from .thermal import ThermalRating
@@ -144,13 +145,7 @@ def _flank(found: PairRating, rating: Rating) -> Iterator[Row]:
     yield Row("Z_W", "work hardening factor", flank.work_hardening)
     yield Row("Z_X", "size factor", flank.size)
     yield Row("Z_NT", "life factor", verdict.life_factor)
-    yield Row("sigma_HG / sigma_Hlim", "product of the factors", verdict.limit / np.asarray(limits))
-    yield Row("sigma_HG", "limit strength", verdict.limit, "MPa", 2)
-    yield Row("sigma_HP", "permissible stress", verdict.permissible, "MPa", 2)
-    yield Row("S_H", "safety", verdict.safety, "", 2)
-    yield Row("S_H^2", "safety on the torque", np.asarray(verdict.safety) ** 2, "", 2)
-    yield Row("P_H", "transmittable power", verdict.power, "kW", 2)
-    yield from _further(verdict, "H", rating)
+    yield from _reached(verdict, "H", limits, "product of the factors", rating)
 
 
 def _root(found: PairRating, rating: Rating) -> Iterator[Row]:
@@ -175,15 +170,18 @@ def _root(found: PairRating, rating: Rating) -> Iterator[Row]:
     yield Row("Y_X", "size factor", root.size)
     yield Row("Y_M", "mean stress factor", root.mean_stress)
     yield Row("Y_NT", "life factor", verdict.life_factor)
-    yield Row("sigma_FG / sigma_Flim", "product of the factors, Y_ST = 2", verdict.limit / np.asarray(limits))
-    yield Row("sigma_FG", "limit strength", verdict.limit, "MPa", 2)
-    yield Row("sigma_FP", "permissible stress", verdict.permissible, "MPa", 2)
-    yield Row("S_F", "safety", verdict.safety, "", 2)
-    yield Row("P_F", "transmittable power", verdict.power, "kW", 2)
-    yield from _further(verdict, "F", rating)
+    yield from _reached(verdict, "F", limits, "product of the factors, Y_ST = 2", rating)
 
 
-def _further(verdict: Any, index: str, rating: Rating) -> Iterator[Row]:
+def _reached(verdict: Verdict, index: str, limits: Any, product: str, rating: Rating) -> Iterator[Row]:
+    """Rows from the product of the factors to the damage sum."""
+    yield Row(f"sigma_{index}G / sigma_{index}lim", product, verdict.limit / np.asarray(limits))
+    yield Row(f"sigma_{index}G", "limit strength", verdict.limit, "MPa", 2)
+    yield Row(f"sigma_{index}P", "permissible stress", verdict.permissible, "MPa", 2)
+    yield Row(f"S_{index}", "safety", verdict.safety, "", 2)
+    if index == "H":
+        yield Row("S_H^2", "safety on the torque", np.asarray(verdict.safety) ** 2, "", 2)
+    yield Row(f"P_{index}", "transmittable power", verdict.power, "kW", 2)
     yield Row(f"sigma_{index}G,stat", "static strength", verdict.static_limit, "MPa", 2)
     yield Row(f"S_{index},stat", "static safety", verdict.static_safety, "", 2)
     if rating.service_life is not None:
@@ -317,17 +315,33 @@ def point_table(thermal: ThermalRating) -> Table:
     return Table(("", *POINTS), cells, "points of the path of contact, ISO/TS 6336-20 and -22")
 
 
-def part(found: PairRating, thermal: ThermalRating, rating: Rating, name: str) -> Part:
-    """The rating of a design by its name, for the terminal, the report and the files."""
+def part(found: PairRating, thermal: ThermalRating, rating: Rating, name: str, *, coast: bool = False) -> Part:
+    """The rating of a design by its name, for the terminal, the report and the files.
+
+    Args:
+        found, thermal: numbers of the rating.
+        rating: settings.
+        name: of the design.
+        coast: whether the coast flanks are rated, which carry a negative torque.
+    """
     return Part(
         tables=(safety_table(found, thermal, rating),),
-        chapters=tuple(chapters(found, thermal, rating, name)),
+        chapters=tuple(chapters(found, thermal, rating, name, coast=coast)),
         data=summary(found, thermal, rating),
         lines=tuple(lines(found, thermal, rating)),
+        figures=() if rating.service_life is None else (partial(_woehler, found),),
     )
 
 
-def chapters(found: PairRating, thermal: ThermalRating, rating: Rating, name: str) -> list[Chapter]:
+def _woehler(found: PairRating) -> Figure:
+    from .figures import woehler  # imports matplotlib
+
+    return Figure.of(woehler, found)
+
+
+def chapters(
+    found: PairRating, thermal: ThermalRating, rating: Rating, name: str, *, coast: bool = False
+) -> list[Chapter]:
     """The rating of a design as chapters of a report: safeties, factors, spectrum, temperatures and films."""
     chain = rows(found, thermal, rating)
     tables = {title: Table(_HEADER, tuple(row.cells for row in several), title) for title, several in chain.items()}
@@ -335,6 +349,8 @@ def chapters(found: PairRating, thermal: ThermalRating, rating: Rating, name: st
     spectrum = [] if found.spectrum is None else spectrum_tables(found.spectrum)
     points = [point_table(thermal)]
     of = f"Design: {name}. Edition {rating.edition} of ISO 6336; load factors are not in the torque."
+    if coast:
+        of += " The coast flanks are rated, which carry the negative torque."
     first = [safety_table(found, thermal, rating), *mechanical[:1], *spectrum]
     return [
         Chapter("Rating after ISO 6336", [of], tables=first, new_page=True),

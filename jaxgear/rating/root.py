@@ -10,7 +10,7 @@ from jaxtyping import Array, Float
 from ..geometry import Gear, GearPair, PathOfContact
 from ..metrics.stress import RootFactors, root_helix_factor, single_contact_factors
 from ..numerics import Checked, Given, result
-from .life import SNLine, life_factor, strength_line
+from .life import Strengths
 from .mesh_geometry import MeshGeometry
 from .settings import GearRating, Rating, rated_pair
 
@@ -207,23 +207,8 @@ def _mean_stress_factor(gear: GearRating, influence: tuple[float, float], correc
     return 1 / (1 - gear.stress_ratio * (1 - m) / (1 + m))
 
 
-def bending_lines(factors: BendingFactors, rating: Rating) -> tuple[SNLine, SNLine]:
-    """S-N lines of pinion and wheel for the root stress."""
-    pinion, wheel = (
-        strength_line(
-            gear.bending_strength,
-            gear.group.kind.root,
-            factors.reference[of],
-            factors.static[of],
-            rating.long_life_factor,
-        )
-        for of, gear in enumerate(rating.gears)
-    )
-    return pinion, wheel
-
-
-def bending_life_factors(rating: Rating, cycles: OfGears) -> OfGears:
-    """Y_NT of both gears at their load cycles."""
-    return jnp.stack(
-        [life_factor(gear.group.kind.root, cycles[of], rating.long_life_factor) for of, gear in enumerate(rating.gears)]
-    )
+def root_strengths(factors: BendingFactors, rating: Rating) -> Strengths:
+    """Limits, knees and factors of the permissible root stress."""
+    limits = jnp.stack([gear.bending_strength for gear in rating.gears])
+    pinion, wheel = (gear.group.kind.root for gear in rating.gears)
+    return Strengths(limits, (pinion, wheel), factors.reference, factors.static)

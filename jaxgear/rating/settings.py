@@ -20,6 +20,7 @@ ProfileModification = Literal["none", "suitable", "optimal"]
 _LEAST_MODULUS = 50_000.0  # [MPa], of metals
 _CORE_HARDNESS = 25.0, 30.0  # [HRC], least, and from which case-hardened MQ bears more
 _RZ_PER_RA = 6.0
+_SAME = 0.01  # part by which roughnesses of the same flanks may differ
 _CORE_BENDING = 500.0  # sigma_Flim then [MPa]
 
 
@@ -38,7 +39,7 @@ class GearRating(Checked):
         pitting_limit: sigma_Hlim, in place of that of the group.
         bending_limit: sigma_Flim, nominal (without Y_ST = 2), in place of that of the group.
         flank_roughness_rz, flank_roughness_ra: mean peak-to-valley and arithmetic mean roughness of the flank; Rz is
-            6 Ra where it is not given.
+            6 Ra where it is not given. The mean Ra of both gears is that of the lubricant.
         root_roughness_rz: of the tooth root.
         quality_class: flank tolerance class of ISO 1328-1:2013, for the deviations that are not given.
         base_pitch_deviation: f_pb, transverse, on the line of action.
@@ -148,18 +149,17 @@ class GearRating(Checked):
         return jnp.minimum(slope * self.hardness + offset, most)
 
     @property
-    def flank_roughness(self) -> tuple[Scalar, Scalar]:
-        """R_z and R_a of the flank [um], either 6 to 1 of the other where it is not given.
+    def roughness(self) -> Scalar:
+        """R_z of the flank [um]: given, or 6 R_a.
 
         Raises:
             ValueError: where neither is given.
         """
-        rz, ra = self.flank_roughness_rz, self.flank_roughness_ra
-        if rz is not None:
-            return rz, rz / _RZ_PER_RA if ra is None else ra
-        if ra is None:
+        if self.flank_roughness_rz is not None:
+            return self.flank_roughness_rz
+        if self.flank_roughness_ra is None:
             raise ValueError("Z_R needs flank_roughness_rz or flank_roughness_ra of both gears")
-        return _RZ_PER_RA * ra, ra
+        return _RZ_PER_RA * self.flank_roughness_ra
 
 
 class Rating(AbstractSettings):
@@ -167,7 +167,7 @@ class Rating(AbstractSettings):
 
     Attributes:
         edition: of ISO 6336.
-        application_factor: K_A; 1 with a load spectrum.
+        application_factor: K_A; 1 with a load spectrum. Static strength is compared with the load without it.
         mesh_load_factor: K_gamma, uneven sharing between several meshes.
         dynamic_factor: K_v; by method B of ISO 6336-1 where it is not given.
         face_load_factor: K_Hbeta; by method C from `shaft_deflection` and `mesh_misalignment`, or else that of the
@@ -225,6 +225,21 @@ class Rating(AbstractSettings):
             raise ValueError("Rating: shaft_deflection and mesh_misalignment belong together, give both")
         if self.shaft_deflection is not None and self.face_load_factor is not None:
             raise ValueError("Rating: shaft_deflection has no effect beside face_load_factor, give either")
+        self._check_roughness()
+
+    def _check_roughness(self) -> None:
+        """Both gears' R_a and that of the lubricant, which films and friction count, are of the same flanks."""
+        of_oil = None if self.lubricant is None else self.lubricant.roughness
+        given = self.pinion.flank_roughness_ra, self.wheel.flank_roughness_ra, of_oil
+        known = [number for each in given if each is not None and (number := concrete(each)) is not None]
+        if len(known) < len(given):
+            return
+        first, second, mean = known
+        if (abs(0.5 * (first + second) - mean) > _SAME * mean).any():
+            raise ValueError(
+                f"Rating: flank_roughness_ra = {first.max():g} and {second.max():g} um must have the mean "
+                f"lubricant.roughness = {mean.max():g} um, they are of the same flanks"
+            )
 
     @property
     def gears(self) -> tuple[GearRating, GearRating]:

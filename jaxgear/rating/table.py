@@ -100,7 +100,7 @@ class RatingSection(FurtherTable, section_of(Rating, (*_GEARS, "lubricant", "loa
     def part(self, design: DesignFile, name: str, cycle: MeshCycle) -> Part:
         """The rating for the terminal, the report and the files."""
         rating, analysis = self.settings(design), _analysis(design, cycle)
-        return part(rating_of(analysis, rating), thermal_of(analysis, rating), rating, name)
+        return part(rating_of(analysis, rating), thermal_of(analysis, rating), rating, name, coast=design.coast)
 
     def _gear(self, name: str, quality: int | None) -> GearRating:
         section = getattr(self, name)

@@ -5,6 +5,7 @@ import jax.numpy as jnp
 from ..metrics.lubricant import Lubricant
 from ..numerics import Checked, Given, program, result
 from .chain import PairRating
+from .load_factors import running_in_relief
 from .load_sharing import MeshLoad
 from .losses import churning_loss, hydraulic_torque, loss_factor, mesh_friction, mesh_loss
 from .mesh_geometry import MeshGeometry, OfGears, Scalar
@@ -66,7 +67,6 @@ def thermal_rating(
 def _thermal(found: PairRating, torque: Scalar, speed: Scalar, rating: Rating, tip_relief: OfGears) -> ThermalRating:
     assert rating.lubricant is not None
     factors, grades = found.factors, [gear.quality_class or 0 for gear in rating.gears]
-    limits = jnp.stack([gear.pitting_strength for gear in rating.gears])
     load = MeshLoad(
         torque=torque,
         speed=speed,
@@ -75,7 +75,7 @@ def _thermal(found: PairRating, torque: Scalar, speed: Scalar, rating: Rating, t
         single_stiffness=factors.single_stiffness,
         mesh_stiffness=factors.mesh_stiffness,
         tip_relief=tip_relief,
-        running_in_relief=jnp.mean((limits / 97 - 18.45) ** 2 / 18 + 1.5),  # ISO 6336-1, mean of both materials
+        running_in_relief=running_in_relief(rating),
         accuracy_grade=jnp.full_like(torque, max(grades)),
         meshes=jnp.maximum(*(gear.contacts_per_revolution for gear in rating.gears)),
     )

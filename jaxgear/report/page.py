@@ -155,12 +155,14 @@ class Part:
         chapters: of the report.
         data: for `summary.json`, under the name of the table.
         lines: rows of a CSV file of that name, the first its header; none without any.
+        figures: functions that draw one each.
     """
 
     tables: tuple[Table, ...] = ()
     chapters: tuple[Chapter, ...] = ()
     data: Mapping[str, Any] = field(default_factory=dict)
     lines: tuple[tuple[str, ...], ...] = ()
+    figures: tuple[Callable[[], Figure], ...] = ()
 
 
 _TEMPLATES = Path(__file__).parent / "templates"

@@ -115,9 +115,11 @@ class ComparisonResult(AbstractStudyResult):
         return {key: each for key, each in found.items() if isinstance(each, Part)}
 
     def figures(self) -> Iterator[Figure]:
-        """Figures of the designs, and of their scatter over manufactured gears."""
+        """Figures of the designs, of their scatter over manufactured gears, and of what tables of the file add."""
         yield from side_by_side.figures(self.design, self.mesh, self.evaluations, self.torques)
         yield from manufactured.figures(self.evaluations)
+        for part in self.parts.values():
+            yield from (draw() for draw in part.figures)
 
     def tables(self) -> Iterator[Table]:
         """Tables of the designs side by side, and of further tables of the file."""
