@@ -11,7 +11,7 @@ import jaxgear as jg
 from jaxgear.geometry.path import path_between
 from jaxgear.metrics import Lubricant
 from jaxgear.numerics import changed, quick_jit, real
-from jaxgear.rating import GearRating, Rating, rate
+from jaxgear.rating import GearRating, Rating, mesh_geometry, rate
 
 
 class Case(NamedTuple):
@@ -97,6 +97,17 @@ def _rated(case):
 def rated(case: Case):
     """The rating of a case."""
     return _rated(jax.tree.map(jnp.asarray, case))
+
+
+@quick_jit
+def _geometry(gears, center_distance):
+    pair = jg.GearPair(*gears, center_distance)
+    return mesh_geometry(pair, unlimited(pair))
+
+
+def geometry_of(case: Case):
+    """The geometry of a case."""
+    return _geometry(*jax.tree.map(jnp.asarray, case[:2]))
 
 
 def with_rating(case: Case, **fields) -> Case:

@@ -105,6 +105,7 @@ HEAVY = {
     "xarray",
     "xlsxwriter",
     "jaxgear.layout.figures",
+    "jaxgear.rating.figures",
     "jaxgear.plot",
 }
 # so do the commands, and their help without any of the library

@@ -1,10 +1,10 @@
 """Scuffing, micropitting and losses after ISO/TS 6336: published numbers, limits, continuity, derivatives.
 
-`published_thermal.csv` has the numbers as reports print them. A number holds within 0.1 % or half a unit of the last
-printed digit; a row with a note says why it does not.
+`published_ratings.json` has the numbers as reports print them. A number holds within 0.1 % or half a unit of the last
+printed digit; `OPEN` names those that do not, and why.
 """
 
-import csv
+import json
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -13,11 +13,11 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from rated_pairs import FZG_C, STAGE_3, geometry_of
 
-import jaxgear as jg
-from jaxgear.geometry import Material
 from jaxgear.metrics import Lubricant
-from jaxgear.rating import GearRating, mesh_geometry
+from jaxgear.numerics import quick_jit
+from jaxgear.rating import GearRating
 from jaxgear.rating.load_sharing import POINTS, MeshLoad, load_sharing, mean_over_path
 from jaxgear.rating.losses import churning_loss, hydraulic_torque, mesh_friction, mesh_loss, splash_factor
 from jaxgear.rating.micropitting import film_of_test, material_factor, micropitting, permissible_film_thickness
@@ -30,51 +30,45 @@ from jaxgear.rating.scuffing import (
 )
 from jaxgear.rating.thermal import rate_thermal
 
-FILE = Path(__file__).with_name("published_thermal.csv")
-ROWS = list(csv.DictReader(line for line in FILE.read_text().splitlines() if not line.startswith("#")))
+PRINTED = json.loads(Path(__file__).with_name("published_ratings.json").read_text())
+AT_E = "the report has friction at E"
+OPEN = {
+    "ks_stage3": {
+        "lambda_GFT": "printed from rounded temperatures of the test",
+        "S_lambda": "follows lambda_GFT",
+        **dict.fromkeys(("mu_20", "theta_flm", "theta_Mi", "theta_Bmax", "S_B"), AT_E),
+        "theta_flaint": "0.9 % off; mean of the report unknown",
+        **dict.fromkeys(("theta_MC", "theta_int", "S_intS", "S_SL"), "follows theta_flaint"),
+        "P_VZP": "coefficient of friction of its own",
+    },
+    "st_fzg_c": {
+        "eta_oil": "another law of viscosity",
+        **dict.fromkeys(("theta_M21", "theta_int", "S_SL"), "X_alphabeta rounded"),
+        "rho_C": "printed at another point near C",
+    },
+}
+COMPARED = {"ks_stage3": 54, "st_fzg_c": 59}
 STAGE_10 = 265.1  # N m
-
-
-def pair_of(teeth, shifts, tips, width, center, helix=None, *, material, **options):
-    pinion, wheel = (
-        jg.Gear(
-            z,
-            options.pop("module", module),
-            profile_shift=x,
-            face_width=width,
-            tip_diameter=tip,
-            helix_angle=angle,
-            material=material,
-            **options,
-        )
-        for module in [options.pop("module")]
-        for z, x, tip, angle in zip(teeth, shifts, tips, (helix, helix and -helix))
-    )
-    return jg.GearPair(pinion, wheel, center_distance=center)
 
 
 def wind_turbine():
     """Stage 3 of a 5 MW gearbox."""
-    sink = Material(thermal_contact_coefficient=13_780.0)
-    options = {"module": 14.0, "root_radius": 0.38, "material": sink}
-    pair = pair_of((24, 95), (0.48, 0.6691), (380.747, 1395.376), 360.0, 861.0, 10.0, **options)
+    geometry = replace(geometry_of(STAGE_3), thermal_contact_coefficient=jnp.full(2, 13_780.0))
     oil = Lubricant(220.0, 19.0, 80.0, 0.6, density=890.0, fzg_stage=14.0, run_in=1.0, micropitting_test=STAGE_10)
     # out of the contact stress with and without them
     factors = (739.61 / 570.79) ** 2
-    return pair, load_of(40_953.0, 1165.9, 1.25, factors, 13.832, 18.632, relief=1.995, grade=6.0), oil
+    return geometry, load_of(40_953.0, 1165.9, 1.25, factors, 13.832, 18.632, relief=1.995, grade=6.0), oil
 
 
 def rig():
     """FZG type C."""
-    material = Material(elastic_modulus=210_000.0, thermal_contact_coefficient=435.0 * 1000**0.5)
-    options = {"module": 4.5, "dedendum": 1.39, "root_radius": 0.25, "material": material}
-    pair = pair_of((16, 24), (0.1818, 0.1714), (82.45, 118.35), 14.0, 91.5, **options)
+    geometry = replace(geometry_of(FZG_C), thermal_contact_coefficient=jnp.full(2, 435.0 * 1000**0.5))
     oil = Lubricant(90.02, 10.41, 60.0, 0.3, density=884.1, fzg_stage=6.0, micropitting_test=STAGE_10)
     factors = (1270.3 / 1.075 / 1013.8) ** 2
-    return pair, load_of(130.0, 1500.0, 1.0, factors, 11.48, 15.23, relief=2.0, grade=5.0), oil
+    return geometry, load_of(130.0, 1500.0, 1.0, factors, 11.48, 15.23, relief=2.0, grade=5.0), oil
 
 
-SETS = {"KS": wind_turbine, "ST": rig}
+SETS = {"ks_stage3": wind_turbine, "st_fzg_c": rig}
 
 
 def load_of(torque, speed, outer, factors, single, mesh, *, relief, grade) -> MeshLoad:
@@ -84,11 +78,12 @@ def load_of(torque, speed, outer, factors, single, mesh, *, relief, grade) -> Me
     )
 
 
+@quick_jit
 def rated(geometry, load, oil):
     return rate_thermal(geometry, load, oil, jnp.ones(2))
 
 
-@jax.jit
+@quick_jit
 def printed_by(geometry, load, oil):
     found = rated(geometry, load, oil)
     flash, integral, film = found.flash, found.integral, found.micropitting
@@ -163,24 +158,31 @@ def printed_by(geometry, load, oil):
     }
     for point, place in at.items():
         numbers |= {f"Gamma_{point}": flash.path_parameter[place], f"theta_fl{point}": flash.flash_temperature[place]}
-        numbers |= {f"p_H_{point}": film.pressure[place], f"rho_{point}": film.normal_radius[place]}
-    return numbers
+    return numbers | {"p_H": film.pressure, "rho": film.normal_radius}
 
 
 @pytest.mark.parametrize("name", SETS)
 def test_numbers_of_reports(name):
-    pair, load, oil = SETS[name]()
-    found = printed_by(mesh_geometry(pair), load, oil)
-    in_units = {"P_VZP": 1e-3} if name == "KS" else {"B_M": 1e1**1.5}  # kW; m^0.5 mm^0.5 in place of m
-    found |= {quantity: factor * found[quantity] for quantity, factor in in_units.items()}
-    wrong = []
-    for row in (row for row in ROWS if row["set"] == name):
-        printed, value = float(row["printed"]), float(found[row["quantity"]])
-        half = 0.5 * 10.0 ** -len(row["printed"].partition(".")[2])
-        missed = abs(value - printed) > max(half * (1 + 1e-9), 1e-3 * abs(printed))
-        if missed != bool(row["note"]):
-            wrong.append((row["quantity"], row["printed"], value, row["note"]))
-    assert wrong == []
+    geometry, load, oil = SETS[name]()
+    found = printed_by(geometry, load, oil)
+    in_units = {"P_VZP": 1e-3} if name == "ks_stage3" else {"B_M": 1e1**1.5}  # kW; m^0.5 mm^0.5 in place of m
+    found |= {symbol: factor * found[symbol] for symbol, factor in in_units.items()}
+    missed, compared = set(), 0
+    for row in (row for part, section in PRINTED[name]["sections"].items() if part != "input" for row in section):
+        if row["symbol"] in found:
+            values = np.ravel(found[row["symbol"]])
+            missed.update(misses(row["symbol"], row["printed"], values))
+            compared += len(values)
+    assert missed == OPEN[name].keys() and compared == COMPARED[name]
+
+
+def misses(symbol, printed, values):
+    """Names of the numbers that are not those printed."""
+    at = f"{symbol}_{{}}" if len(values) > 1 else symbol
+    for point, text, value in zip(POINTS, printed, values, strict=False):
+        half = 0.5 * 10.0 ** -len(text.partition(".")[2])
+        if abs(value - float(text)) > max(half * (1 + 1e-9), 1e-3 * abs(float(text))):
+            yield at.format(point)
 
 
 # sharing of the load
@@ -188,8 +190,7 @@ def test_numbers_of_reports(name):
 
 @pytest.mark.parametrize("relief", [0.0, 0.4, 1.0])
 def test_two_pairs_of_spur_gears_carry_the_whole_load(relief):
-    pair, load, _ = rig()
-    geometry = mesh_geometry(pair)
+    geometry, load, _ = rig()
     load = replace(load, tip_relief=relief * load.effective_relief(geometry) * jnp.ones(2))
     start, inner, _, outer, _ = geometry.path
     path = jnp.linspace(start, inner, 7)[:-1]
@@ -200,8 +201,7 @@ def test_two_pairs_of_spur_gears_carry_the_whole_load(relief):
 
 
 def test_helical_gears_share_by_the_contact_ratio_and_more_at_the_ends():
-    pair, load, _ = wind_turbine()
-    geometry = mesh_geometry(pair)
+    geometry, load, _ = wind_turbine()
     share = load_sharing(geometry, load, jnp.stack([geometry.path[0], jnp.zeros(()), geometry.path[-1]]))
     np.testing.assert_allclose(share * geometry.contact_ratio, [1.3, 1.0, 1.3], rtol=1e-12)
     # between spur gears and an overlap ratio of 1 without a jump
@@ -210,7 +210,7 @@ def test_helical_gears_share_by_the_contact_ratio_and_more_at_the_ends():
 
 
 def test_mean_over_the_path_is_that_of_the_closed_form():
-    geometry = mesh_geometry(wind_turbine()[0])
+    geometry = wind_turbine()[0]
     start, *_, end = geometry.path
     sliding = (start**2 + end**2) / 2 / (end - start)
     assert float(mean_over_path(geometry, jnp.abs)) == pytest.approx(float(sliding), rel=1e-12)
@@ -232,8 +232,7 @@ def test_contact_ratio_factor_is_one_surface():
 
 def test_flash_temperature_is_that_of_blok():
     """In SI, on the transverse line of action at the tip of the pinion, where a spur pair of load K w_Bt X rubs."""
-    pair, load, oil = rig()
-    geometry = mesh_geometry(pair)
+    geometry, load, oil = rig()
     found = rated(geometry, load, oil).flash
     end, angle = geometry.path[-1], geometry.working_pressure_angle
     force = found.line_load * found.sharing_factor[-1] / jnp.cos(angle)  # along the line of action
@@ -245,7 +244,7 @@ def test_flash_temperature_is_that_of_blok():
 
 
 def test_materials_count_by_the_speed_of_their_surface():
-    geometry = mesh_geometry(rig()[0])
+    geometry = rig()[0]
     pinion, wheel = (
         replace(geometry, thermal_contact_coefficient=jnp.asarray(both)) for both in ((9e3, 1e4), (1e4, 9e3))
     )
@@ -257,8 +256,7 @@ def test_materials_count_by_the_speed_of_their_surface():
 
 
 def test_load_factors_do_not_heat_the_loss_and_relief_cools():
-    pair, load, oil = rig()
-    geometry = mesh_geometry(pair)
+    geometry, load, oil = rig()
     plain, loaded = (rated(geometry, replace(load, load_factors=jnp.asarray(factor)), oil) for factor in (1.0, 2.0))
     assert float(loaded.loss_power) == float(plain.loss_power)
     rubs = 2**0.2
@@ -310,8 +308,7 @@ def test_hydraulic_torque_by_hand():
 
 
 def test_churning_by_hand_and_without_a_jump():
-    pair, _, oil = rig()
-    geometry = mesh_geometry(pair)
+    geometry, _, oil = rig()
     diameter, nu, rho = geometry.working_diameter[1] * 1e-3, float(oil.kinematic_viscosity(60.0)), 884.1 - 0.7 * 44
 
     def power(reynolds, depth=30.0):
@@ -348,11 +345,11 @@ def lost(geometry, load, oil):
 @pytest.mark.parametrize("of, forward", [(heated, True), (lost, False)])
 def test_derivatives_are_those_of_central_differences(of, forward):
     """By geometry, load, and oil together, each number by a share of its own; and nothing leaves single precision."""
-    pair, load, oil = wind_turbine()
+    geometry, load, oil = wind_turbine()
     load = replace(load, tip_relief=jnp.array([20.0, 10.0]))
     dipped = {"pinion_immersion": 40.0, "oil_volume": 400.0, "run_in": 0.5, "fzg_stage": 11.3}
     oil = replace(oil, **{key: jnp.asarray(value) for key, value in dipped.items()})
-    leaves, shape = jax.tree.flatten((mesh_geometry(pair), load, oil))
+    leaves, shape = jax.tree.flatten((geometry, load, oil))
     random = np.random.default_rng(5)
     ways = [jnp.asarray(np.asarray(leaf) * random.uniform(0.5, 1.5, np.shape(leaf))) for leaf in leaves]
 
@@ -362,7 +359,7 @@ def test_derivatives_are_those_of_central_differences(of, forward):
     differentiate = (
         jax.grad if not forward else lambda of, at: lambda *x: jax.jvp(partial(of, *x[:2]), x[2:], (1.0,))[1]
     )
-    program = jax.jit(lambda *x: (along(*x), differentiate(along, 2)(*x)))
+    program = quick_jit(lambda *x: (along(*x), differentiate(along, 2)(*x)))
     step = 1e-5
     (above, _), (_, slope), (below, _) = (program(leaves, ways, by) for by in (step, 0.0, -step))
     assert float(slope) == pytest.approx(float(above - below) / (2 * step), rel=1e-6)
