@@ -71,7 +71,7 @@ def _before_the_workers():
     if "XLA_FLAGS" not in os.environ:
         wanted = {**programs.OPTIONS, "xla_cpu_parallel_codegen_split_count": 1, "xla_disable_hlo_passes": PASSES}
         del wanted[OPTIMIZATION]  # the configuration says it, which a test can change
-        flags = (f"--{name}={str(value).lower()}" for name, value in programs.known_of(wanted).items())
+        flags = (f"--{name}={str(value).lower()}" for name, value in programs.supported_options(wanted).items())
         os.environ["XLA_FLAGS"] = " ".join(flags)
 
 

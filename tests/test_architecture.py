@@ -192,7 +192,7 @@ OF_ANY_TYPE = {
     "io/tables.py FurtherTable.findings": "likewise",
     "io/tables.py FurtherTable.part": "likewise",
     "io/tables.py FurtherTable.quantity": "likewise",
-    "io/template.py Part.build": "makes an object of the class that the part names",
+    "io/template.py Template.build": "makes an object of the class that the template names",
     "rexs/model.py checked_object": "data of a file, of any type",
     "studies/registry.py load": "a class of a file that is imported when it is asked for",
     "sweeps/store.py Store.table": "an object of a package that is imported when it is asked for",

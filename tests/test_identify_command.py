@@ -82,7 +82,7 @@ class Search:
             chi_square=jnp.asarray(1.0),
             converged=jnp.asarray(True),
             candidates=jnp.array([50.0]),
-            told_by_candidates=jnp.full((1, count), 0.2),
+            candidate_singular_values=jnp.full((1, count), 0.2),
         )
 
 

@@ -91,7 +91,7 @@ class ShareStudy(AbstractStudy[ShareResult]):
                 ASKED.append(torque)
                 return {"share": np.asarray(torque / self.design.pair().pinion.teeth)}
 
-            shares[torque] = float(kept((torque, self.design.says), share)["share"])
+            shares[torque] = float(kept((torque, self.design.text), share)["share"])
         return ShareResult(shares)
 '''
 

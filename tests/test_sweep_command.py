@@ -74,7 +74,7 @@ def test_the_best_variant_says_what_a_finer_mesh_would_change_and_what_is_unusua
     assert f"evaluated at 16 positions; twice as many change PPTE: {told}" in result.out
     assert told in (folder / "out" / "report.html").read_text("utf-8")
     monkeypatch.setitem(LIMITS, "flank pressure", LIMITS["flank pressure"]._replace(high=1.0))
-    _, (unusual,) = SWEEPS.said_of_best(file, best, size)
+    _, (unusual,) = SWEEPS.best_variant_lines(file, best, size)
     assert unusual.startswith(f"warning: variant {best.column('variant')[0]} at 50 N m: flank pressure ")
 
 

@@ -242,7 +242,7 @@ def _code_of(arguments: Sequence[str] | None) -> int:
         given = sys.argv[1:] if arguments is None else list(arguments)
         code = app(args=given, obj=given, prog_name="jaxgear", standalone_mode=False)
         sys.stdout.flush()  # what cannot be written is known here, not when the interpreter ends
-        if code == INTERRUPTED or interrupt.state.asked:
+        if code == INTERRUPTED or interrupt.state.requested:
             return _say_interrupted()
     except (KeyboardInterrupt, typer.Abort):
         return _say_interrupted()
@@ -256,7 +256,7 @@ def _code_of(arguments: Sequence[str] | None) -> int:
     except Exception as error:  # noqa: BLE001 - a user never sees a traceback
         if os.environ.get("JAXGEAR_DEBUG"):
             raise
-        if interrupt.state.asked:  # a library has made something else of it
+        if interrupt.state.requested:  # a library has made something else of it
             return _say_interrupted()
         print(f"jaxgear: error: {streams.one_line(error)}", file=sys.stderr)
         if isinstance(error, OSError):

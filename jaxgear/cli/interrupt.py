@@ -23,8 +23,8 @@ _SOON = 0.02  # seconds in which Python is out of the callback
 class State:
     """Interruption state of the running command."""
 
-    asked: bool = False  # a signal came
-    held: bool = False  # it has to wait
+    requested: bool = False  # a signal came
+    delayed: bool = False  # it has to wait
     written: str = NOTHING  # what is on the disk
     before: Any = None  # what the signals did before `listening`, None where nothing listens
 
@@ -35,7 +35,7 @@ state = State()
 @contextmanager
 def listening() -> Iterator[None]:
     """Takes care of both signals for a block; nothing changes outside the main thread."""
-    state.asked, state.held, state.written, state.before = False, False, NOTHING, None
+    state.requested, state.delayed, state.written, state.before = False, False, NOTHING, None
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -70,20 +70,20 @@ def note(written: str) -> None:
 
 def check() -> None:
     """Raises KeyboardInterrupt where an earlier one was lost."""
-    if state.asked and not state.held:
+    if state.requested and not state.delayed:
         raise KeyboardInterrupt
 
 
 @contextmanager
-def held(then: str) -> Iterator[None]:
+def delayed(then: str) -> Iterator[None]:
     """Lets both signals wait for the end of a block that must not be left half done; `then` is what is on the disk."""
     check()
-    state.held = True
+    state.delayed = True
     try:
         yield
         state.written = then
     finally:
-        state.held = False
+        state.delayed = False
     check()
 
 
@@ -93,7 +93,7 @@ def _restore() -> None:
 
 
 def _interrupted(*_) -> None:
-    state.asked = True
+    state.requested = True
     check()
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import jax
 
-from ..numerics.durable import KeptFiles, program_folder
+from ..numerics.durable import FileStore, program_folder
 from ..numerics.programs import ProgramStore, keep
 
 _DEVICES_FLAG = "xla_force_host_platform_device_count"
@@ -73,7 +73,7 @@ def enable_cache() -> Path | None:
     return folder
 
 
-class Files(KeptFiles):
+class Files(FileStore):
     """Programs as files of a folder, named by all that they depend on."""
 
     def __init__(self, folder: Path) -> None:

@@ -97,7 +97,7 @@ def run_study(
         checkpoints = Checkpoints() if study.grows else _checkpoints(target)
         with ExitStack() as putting_in_place, _folder(study, target, stages) as folder:
             _import_ahead(*study.needs, *_FIGURES * figures)
-            result = study.run(checkpoints=checkpoints, callback=partial(_told, study, target, stages))
+            result = study.run(checkpoints=checkpoints, callback=partial(_show_progress, study, target, stages))
             if jax.process_index() > 0:  # the first process speaks for all
                 return not list(result.failures())
             stages.begin("writing the results")
@@ -120,7 +120,7 @@ def run_study(
             if asked is not None:
                 asked.write(folder, study, result, captions)
             write_study_summary(folder, study, result)
-            putting_in_place.enter_context(interrupt.held(f"the results are in {target}{os.sep}"))
+            putting_in_place.enter_context(interrupt.delayed(f"the results are in {target}{os.sep}"))
             putting_in_place.callback(checkpoints.remove)
     if study.quick and study.coarse:
         terminal.say(f"quick run, {study.coarse}: a preview, do not use for design")
@@ -142,7 +142,7 @@ def _folder(study: AbstractStudy[Any], target: Path, stages: Stages) -> Iterator
         yield folder
 
 
-def _told(study: AbstractStudy[Any], target: Path, stages: Stages, progress: Progress) -> None:
+def _show_progress(study: AbstractStudy[Any], target: Path, stages: Stages, progress: Progress) -> None:
     """Shows how far a study is; the message of an interruption says where a growing result is."""
     if study.grows and progress.total:
         there = f"{progress.done or 0:,} of {progress.total:,} {study.grows} are in {target}{os.sep}"

@@ -22,7 +22,7 @@ from .poincare import (
     corrected,
     family_of,
     first_direction,
-    held,
+    no_gradient,
     nodes_of,
     scaled,
 )
@@ -188,12 +188,14 @@ def bifurcation_of(oscillator: Oscillator | Family, near: Bifurcation, *, steps:
 
 @kernel
 def _moved(family: Family, given, nodes, kind: Kind, periods: int) -> BifurcationPoint:
-    z, parameter, normal, multiplier = held(given)
+    z, parameter, normal, multiplier = no_gradient(given)
     scales = Scales(jnp.linalg.norm(z), parameter)
     begin = scales.place(z, parameter)
-    search = held(_searched(held(family), kind, begin, normal, multiplier, scales, held(nodes), periods))
+    search = no_gradient(
+        _searched(no_gradient(family), kind, begin, normal, multiplier, scales, no_gradient(nodes), periods)
+    )
     place = search.point.place
-    pairs = held(_growing(search.point.monodromy, _critical(kind, search.point.monodromy, multiplier)))
+    pairs = no_gradient(_growing(search.point.monodromy, _critical(kind, search.point.monodromy, multiplier)))
 
     def equations(place, family):
         def over(place):
@@ -204,14 +206,14 @@ def _moved(family: Family, given, nodes, kind: Kind, periods: int) -> Bifurcatio
         growths = [left @ (over(place + by) - over(place - by)) / (2 * _ASIDE) for left, by in pairs]
         return jnp.append(over(place), sum(growths))
 
-    unknowns = jax.jacfwd(lambda place: equations(place, held(family)))(place)
-    left = held(_without(unknowns[:, :-1], unknowns[:, -1]))
+    unknowns = jax.jacfwd(lambda place: equations(place, no_gradient(family)))(place)
+    left = no_gradient(_without(unknowns[:, :-1], unknowns[:, -1]))
     moved = left @ equations(place, family)
     at, value = scales.unknowns(place)
-    _, frequency = held(family)(value)
+    _, frequency = no_gradient(family)(value)
     x, v = jnp.split(at, 2)
     return BifurcationPoint(
-        parameter=value - scales.parameter * (moved - held(moved)) / held(left @ unknowns[:, -1]),
+        parameter=value - scales.parameter * (moved - no_gradient(moved)) / no_gradient(left @ unknowns[:, -1]),
         displacement=x,
         velocity=v * 2 * jnp.pi * frequency,
         test=search.tests[1],

@@ -111,15 +111,15 @@ class MeshTables(WithStatus):
         ):
             yield name, (of, axes), by_torque, np.column_stack([self.phase, table.T])
         nodes = np.broadcast_to(self.map_phase[:, None], self.map_dte.shape), self.map_dte, self.map_force
-        said: tuple[str, ...] = (
+        lines: tuple[str, ...] = (
             f"mesh force [N] over phase and dynamic transmission error (DTE) [um], made for {self.torque:.9g} N m",
             f"{self.map_dte.shape[1]} nodes per phase, rising; linear between nodes, and between phases at equal node",
         )
-        yield "force_map.csv", said, ("phase", "dte_um", "force_N"), np.stack([each.ravel() for each in nodes], axis=1)
+        yield "force_map.csv", lines, ("phase", "dte_um", "force_N"), np.stack([each.ravel() for each in nodes], axis=1)
         torque, order = (each.ravel() for each in np.meshgrid(self.torques, self.order, indexing="ij"))
         rows = np.stack([torque, order, self.amplitude.ravel(), self.order_phase.ravel()], axis=1)
-        said = ("transmission error = mean + sum of amplitude cos(360 deg order phase + phase_deg)",)
-        yield "te_orders.csv", said, ("torque_Nm", "order", "amplitude_um", "phase_deg"), rows
+        lines = ("transmission error = mean + sum of amplitude cos(360 deg order phase + phase_deg)",)
+        yield "te_orders.csv", lines, ("torque_Nm", "order", "amplitude_um", "phase_deg"), rows
 
 
 def _write_csv(path: Path, lines: Sequence[str], columns: Sequence[str], rows: np.ndarray) -> None:

@@ -194,7 +194,7 @@ def first_direction(size: int, dtype: np.dtype, sign: float) -> Place:
     return jnp.zeros(size, dtype).at[-1].set(sign)
 
 
-def held(tree: _Tree) -> _Tree:
+def no_gradient(tree: _Tree) -> _Tree:
     """Tree with stopped gradients of all its arrays."""
     arrays, rest = eqx.partition(tree, eqx.is_array)
     return eqx.combine(jax.lax.stop_gradient(arrays), rest)

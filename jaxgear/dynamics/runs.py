@@ -27,7 +27,7 @@ def side_by_side(batch: int | None) -> int:
 
 Responses = dict[str, SpeedResponse]
 Direction = Literal["up", "down"]
-_Ways = tuple[tuple[str, Direction], ...]  # names and directions of runs
+_Directions = tuple[tuple[str, Direction], ...]  # names and directions of runs
 
 # Designs whose mesh forces are made at the same time: those of a CPU fit its cache.
 _MADE_TOGETHER, _MADE_TOGETHER_ELSEWHERE = 4, 64
@@ -64,7 +64,7 @@ def speed_runs(oscillator: Oscillator, mesh_frequencies: Numbers, runs: Mapping[
     if options.get("steps") is None:
         options["steps"] = steps_for(oscillator, frequencies)
     sizes, limits = _prepared(frequencies, runs, options)
-    return _named(_of_one(oscillator, (frequencies, limits), sizes), _ways(runs))
+    return _named(_of_one(oscillator, (frequencies, limits), sizes), _directions_of(runs))
 
 
 def design_runs(
@@ -121,9 +121,9 @@ def _in_batches(
         return rows.reshape(-1, batch, *rows.shape[1:])
 
     rows = divided(jax.tree.map(batches, designs), devices)
-    found = _of_designs(rows, (frequencies, limits), make, keep, _ways(runs), sizes, devices)
+    found = _of_designs(rows, (frequencies, limits), make, keep, _directions_of(runs), sizes, devices)
     found = jax.tree.map(lambda part: part.reshape(-1, *part.shape[2:])[:count], found)
-    return found if keep else _named(found, _ways(runs), axis=1)
+    return found if keep else _named(found, _directions_of(runs), axis=1)
 
 
 def speed_sweeps(
@@ -178,7 +178,7 @@ def _of_one(oscillator: Oscillator, shared, sizes) -> SpeedResponse:
 
 
 @kernel
-def _of_designs(rows, shared, make, keep, ways: _Ways, sizes, devices):
+def _of_designs(rows, shared, make, keep, directions: _Directions, sizes, devices):
     """Responses of designs in batches, or `keep` of them, with the axes of batches and designs in front."""
     together = _MADE_TOGETHER if devices.devices.flat[0].platform == "cpu" else _MADE_TOGETHER_ELSEWHERE
 
@@ -191,7 +191,7 @@ def _of_designs(rows, shared, make, keep, ways: _Ways, sizes, devices):
         )
         found = _of_one(oscillator, (frequencies, limits), sizes)
         found = replace(jax.tree.map(partial(_or_nothing, converged), found), status=found.status)
-        return keep(_named(found, ways)) if keep else found
+        return keep(_named(found, directions)) if keep else found
 
     def of_batch(shared, batch):
         oscillators = jax.lax.map(make, batch, batch_size=together)
@@ -206,14 +206,14 @@ def _or_nothing(converged: Bool[Array, ""], part: Array) -> Array:
     return jnp.where(converged, part, jnp.full((), nothing, part.dtype))
 
 
-def _ways(runs: Mapping[str, Run]) -> _Ways:
+def _directions_of(runs: Mapping[str, Run]) -> _Directions:
     return tuple((name, run.direction) for name, run in runs.items())
 
 
-def _named(found: SpeedResponse, ways: _Ways, axis: int = 0) -> Responses:
+def _named(found: SpeedResponse, directions: _Directions, axis: int = 0) -> Responses:
     """Split responses along the axis of the runs; returns them by the name of the run."""
     each = _along(found, axis)
-    return {name: replace(one, direction=direction) for one, (name, direction) in zip(each, ways, strict=True)}
+    return {name: replace(one, direction=direction) for one, (name, direction) in zip(each, directions, strict=True)}
 
 
 @program

@@ -260,9 +260,9 @@ class Dynamics(AbstractSettings):
             phase: mesh positions of the returned force [base pitches], shape (positions,).
             steps: steps of the integrator per mesh cycle.
         """
-        held, frequency = jax.lax.stop_gradient((oscillator, mesh_frequency))
+        fixed, frequency = jax.lax.stop_gradient((oscillator, mesh_frequency))
         alone = replace(self, mesh_frequencies=frequency[None], steps=steps)
-        return steady_force(oscillator, mesh_frequency, alone.run(held, UP), phase, steps)
+        return steady_force(oscillator, mesh_frequency, alone.run(fixed, UP), phase, steps)
 
     def numbers(self, oscillator: Oscillator) -> SteadyNumbers:
         """Results of all runs with their derivatives, leading axis (runs,).

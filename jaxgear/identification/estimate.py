@@ -66,7 +66,7 @@ class Identified(Checked):
             accurate as the data.
         converged: True if the steps have converged and all contact solutions have converged.
         candidates: further torques [N m], shape (candidates,).
-        told_by_candidates: singular values of the data together with each further torque, shape (candidates,
+        candidate_singular_values: singular values of the data together with each further torque, shape (candidates,
             independent unknowns).
     """
 
@@ -87,12 +87,12 @@ class Identified(Checked):
     chi_square: Scalar = result()
     converged: Bool[Array, ""] = result()
     candidates: Float[Array, " candidates"] = result("N m")
-    told_by_candidates: Float[Array, "candidates independent"] = result()
+    candidate_singular_values: Float[Array, "candidates independent"] = result()
 
     @property
     def best_candidate(self) -> float | None:
         """Further torque that best determines the least determined combination [N m]; None without candidates."""
-        least = np.asarray(self.told_by_candidates)[:, -1:]
+        least = np.asarray(self.candidate_singular_values)[:, -1:]
         return float(self.candidates[int(np.argmax(least))]) if len(least) else None
 
     @property
@@ -100,7 +100,7 @@ class Identified(Checked):
         """Estimates by name without pitch deviations, the arguments of the design."""
         return dict(zip(self.names, self.estimate[: self.own]))
 
-    def not_told(self) -> list[str]:
+    def undetermined(self) -> list[str]:
         """Lines on combinations of unknowns that the prior determines more than the data."""
         lines, values, directions = [], np.asarray(self.singular_values), np.asarray(self.directions)
         of_pitch = np.sum(directions[:, self.own :] ** 2, axis=1) > _CHIEFLY
@@ -450,7 +450,7 @@ def _check_used(design: Design, prior: Prior, mesh: Mesh, torque: float) -> None
     Variants(tuple(prior), design, mesh, None, cases, cases.on(mesh)).traced(means)
 
 
-def _found(problem: _Problem, data: Data, fit: _Fit, candidates: Array, told_by_candidates: Array) -> Identified:
+def _found(problem: _Problem, data: Data, fit: _Fit, candidates: Array, candidate_singular_values: Array) -> Identified:
     turn = problem.turn
     covariance = turn @ fit.covariance @ turn.T
     deviation = jnp.sqrt(jnp.diagonal(covariance))
@@ -474,5 +474,5 @@ def _found(problem: _Problem, data: Data, fit: _Fit, candidates: Array, told_by_
         chi_square=weighted / jnp.maximum(data.value.shape[0] - told, 1.0),
         converged=fit.fine,
         candidates=candidates,
-        told_by_candidates=told_by_candidates,
+        candidate_singular_values=candidate_singular_values,
     )

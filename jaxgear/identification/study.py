@@ -271,7 +271,7 @@ class IdentificationResult(AbstractStudyResult):
             if abs(correlation[first, second]) >= _RELATED:
                 names = f"{found.names[first]} and {found.names[second]}"
                 yield f"correlation of {names}: {correlation[first, second]:.2f}"
-        yield from found.not_told()
+        yield from found.undetermined()
         if found.best_candidate is not None:
             yield f"further torque that would tell most of what is told least: {found.best_candidate:g} N m"
 
@@ -309,7 +309,7 @@ class IdentificationResult(AbstractStudyResult):
             "unknowns": {name: numbers_of(_UNKNOWN, row) for name, row in self._rows().items()},
             "correlation": np.asarray(found.correlation)[: found.own, : found.own],
             "singular_values": np.asarray(found.singular_values),
-            "cannot_tell": found.not_told(),
+            "cannot_tell": found.undetermined(),
             UnitKey("further_torque", "N m"): found.best_candidate,
             "chi_square": float(found.chi_square),
             UnitKey("model_error", "um"): float(found.model_error),

@@ -32,17 +32,17 @@ from .gears import (
     check_pitches,
     drawing_of,
     flank_of,
-    gear_part,
+    gear_template,
     longest_path,
     materials_of,
     pair_of,
     quality_of,
     with_quality,
 )
-from .model_table import ModelSection, ResolutionSection, model_part, resolution_of, with_tables
-from .table_keys import FileTable, decode, entry, nested, part_of, summary
+from .model_table import ModelSection, ResolutionSection, model_template, resolution_of, with_tables
+from .table_keys import FileTable, decode, entry, nested, summary, template_of
 from .tables import FurtherTable, LoadSection, further_tables
-from .template import Free, Part, build
+from .template import Free, Template, build
 from .toml import read
 from .value_types import list_of, table, text
 from .variables import VariableSection, increasing, read_variables
@@ -89,10 +89,10 @@ class FileSection(FileTable):
     wheel: GearSection = entry(nested(GearSection), ...)
     load: LoadSection = entry(nested(LoadSection), ...)
     title: str | None = entry(text())
-    materials: dict[str, Part] | None = entry(table(nested(Material)))
+    materials: dict[str, Template] | None = entry(table(nested(Material)))
     pair: PairSection = entry(nested(PairSection), PairSection("pair"))
     model: ModelSection = entry(nested(ModelSection), ModelSection("model"))
-    misalignment: Part = entry(nested(Misalignment), Part(Misalignment, {}, "misalignment"))
+    misalignment: Template = entry(nested(Misalignment), Template(Misalignment, {}, "misalignment"))
     resolution: FileTable = entry(nested(ResolutionSection), ResolutionSection("resolution"))
     variables: dict[str, VariableSection] = entry(table(nested(VariableSection)), {})
     shafts: list[gearbox.ShaftSection] = entry(list_of(nested(gearbox.ShaftSection), empty=True), [])
@@ -116,8 +116,8 @@ class FileDesign(eqx.Module):
     """
 
     names: tuple[str, ...] = eqx.field(static=True)
-    pinion: list[Part]
-    wheel: list[Part]
+    pinion: list[Template]
+    wheel: list[Template]
 
     def __call__(self, parameters: Mapping[str, Any]) -> tuple[AbstractModification, AbstractModification]:
         """Modifications of pinion and wheel.
@@ -150,9 +150,9 @@ class _MeshParts(NamedTuple):
 class _FileMesh(eqx.Module):
     """The prepared mesh of a design file as a function of its free parameters; pure and traceable."""
 
-    pair: Part
-    model: Part
-    misalignment: Part
+    pair: Template
+    model: Template
+    misalignment: Template
     resolution: Resolution
     coast: bool = eqx.field(static=True)
 
@@ -179,7 +179,7 @@ class DesignFile:
 
     Attributes:
         path: the file.
-        says: all that it held when it was read, as one text.
+        text: the whole file as it was read, as one text.
         title: free text, the file's stem if it has none.
         torque: amount of the design torque on the pinion [N m]; the middle of its bounds where it is a variable.
         coast: whether the torque is negative: mesh and modifications are those of the coast flanks, see
@@ -199,7 +199,7 @@ class DesignFile:
     """
 
     path: Path
-    says: str
+    text: str
     title: str
     torque: float
     coast: bool
@@ -215,7 +215,7 @@ class DesignFile:
     design: FileDesign
     support: ShaftSupport | None
     tables: dict[str, Any]
-    _load: Part
+    _load: Template
     _mesh: _FileMesh
     _middle: _MeshParts
     _longest: GearPair
@@ -412,36 +412,36 @@ def _only(names: set[str], of: Mapping[str, T]) -> dict[str, T]:
     return {name: value for name, value in of.items() if name in names}
 
 
-def _check_coast(says: Mapping[str, Any], further: Mapping[str, type[FurtherTable]], torque: float) -> None:
+def _check_coast(content: Mapping[str, Any], further: Mapping[str, type[FurtherTable]], torque: float) -> None:
     """Raises a `DesignFileError` for tables that know the drive flanks alone."""
     tables = {name: f"[{name}]" for name, cls in further.items() if cls.drive_only}
     for name, shown in sorted({**tables, "misalignment": "[misalignment]", "shafts": "[[shafts]]"}.items()):
-        if name in says:
+        if name in content:
             problem = f"{torque:g} N m is carried by the coast flanks, {_ONLY_DRIVE.format(shown)}"
             raise DesignFileError("load.torque", problem)
 
 
-def _read(file: Path, says: dict[str, Any]) -> tuple[DesignFile, list[FurtherTable]]:
+def _read(file: Path, content: dict[str, Any]) -> tuple[DesignFile, list[FurtherTable]]:
     further = {name: cls for name, cls in further_tables().items() if name not in FileSection.keys}
-    top = decode("", says, file_section(further))
+    top = decode("", content, file_section(further))
     folder, load = file.parent, top.load
     if load.torque_range is not None:
         increasing("load.torque_range[1]", load.torque_range[0], load.torque_range[1], unit=" N m")
     coast = False
     if not isinstance(load.torque, Free) and load.torque < 0:
-        _check_coast(says, further, load.torque)
+        _check_coast(content, further, load.torque)
         load, coast = load.changed(torque=-load.torque), True
     materials = materials_of(top.materials)
     gears = {"pinion": top.pinion, "wheel": top.wheel}
     check_pitches(top.pinion, top.wheel)
-    pair = pair_of(top.pair, *(gear_part(section, materials) for section in gears.values()))
+    pair = pair_of(top.pair, *(gear_template(section, materials) for section in gears.values()))
     flanks, unused = (
         {name: flank_of(section, folder, pair.fields[name], coast=side) for name, section in gears.items()}
         for side in (coast, not coast)
     )
     others = [part for parts in unused.values() for part in parts]
-    axes, point = top.misalignment, part_of(load, OperatingPoint)
-    model = model_part(top.model)
+    axes, point = top.misalignment, template_of(load, OperatingPoint)
+    model = model_template(top.model)
     open_case = [*pair.free(), *model.free(), *axes.free(), *point.free()]
     modifications = [*flanks["pinion"], *flanks["wheel"]]
     empty = [f"{name}.modification" for name, section in gears.items() if section.fields.get("modification") == []]
@@ -460,9 +460,9 @@ def _read(file: Path, says: dict[str, Any]) -> tuple[DesignFile, list[FurtherTab
     if axes.key not in uneven:  # zeros are parallel axes
         axes = replace(axes, fields={})
     torque, quality = float(usual.torque), quality_of(top.pinion, top.wheel)
-    sections = {name: cls.read(says[name], folder) for name, cls in further.items() if name in says}
+    sections = {name: cls.read(content[name], folder) for name, cls in further.items() if name in content}
     sections |= {name: with_quality(section, quality) for name, section in sections.items() if section.classified}
-    tables: dict[str, Any] = {name: section.held for name, section in sections.items()}
+    tables: dict[str, Any] = {name: section.value for name, section in sections.items()}
     uneven += [name for section in sections.values() for name in section.varies_along_face()]
     support = None
     if top.shafts:
@@ -481,7 +481,7 @@ def _read(file: Path, says: dict[str, Any]) -> tuple[DesignFile, list[FurtherTab
     low, high = load.torque_range or [share * torque for share in _TORQUE_RANGE]
     design = DesignFile(
         path=file,
-        says=json.dumps(says, sort_keys=True, default=str),
+        text=json.dumps(content, sort_keys=True, default=str),
         title=top.title or printable(file.stem),
         torque=torque,
         coast=coast,

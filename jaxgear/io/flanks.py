@@ -115,7 +115,7 @@ def _refusal(what: str, value: float, relation: str, limit: float, why: str, sig
 _REMOVED, _WORN, _DESIGN = "modification_um", "wear_depth_um", "design_um"
 # what makes material removed of the first of them
 _AMOUNTS = {MEASURED: -1.0, _REMOVED: 1.0, _WORN: 1.0, _DESIGN: -1.0}
-_ALONG, _ACROSS, _GEAR, _LIFE = "roll_length_mm", "face_coordinate_mm", "gear", "revolutions"
+_ALONG, _ACROSS, _GEAR, _COUNT = "roll_length_mm", "face_coordinate_mm", "gear", "revolutions"
 _ANGLE, _DIAMETER = "roll_angle_deg", "diameter_mm"
 # what machines call them; positive deviations are excess material on all of them
 _COLUMNS = (
@@ -128,7 +128,7 @@ _COLUMNS = (
     Column(_DIAMETER, ("durchmesser",)),
     Column(_ACROSS),
 )
-_SAME_LIFE = 1e-5  # relative: lives are asked for as they are printed, with six digits
+_SAME_COUNT = 1e-5  # relative: revolutions are given as they are printed, with six digits
 
 Method = Literal["linear", "natural_cubic", "monotonic"]
 
@@ -159,7 +159,7 @@ def read_flank(
         design: of a file with several designs.
         side: the gear's side of the contact, of `mesh.sides`: a table that is not on its flank is refused. It may reach
             5 % of active profile and face over their ends, and leave out 20 % at each. None takes any table.
-        revolutions: of the pinion, of a file with several lives of worn flanks.
+        revolutions: of the pinion, of a file with worn flanks after several numbers of them.
         base_radius: of the gear [mm], for files without roll lengths where no side is given.
         method: of interpolation along the profile.
 
@@ -171,7 +171,7 @@ def read_flank(
     if side is not None and base_radius is not None:
         raise ValueError(f"read_flank: base_radius = {base_radius:g} mm has no effect beside side")
     with naming(path):
-        rows = _at_life(_chosen(read_rows(Path(path)), {"gear": gear, "design": design}), revolutions)
+        rows = _at_revolutions(_chosen(read_rows(Path(path)), {"gear": gear, "design": design}), revolutions)
         flank, reach = flank_of_rows(rows, base_radius if side is None else float(side.base_radius), method)
         if side is not None:
             reach.check_on(side.gear, side.start_roll_length, side.common_width, side.face_middle)
@@ -186,7 +186,7 @@ class FlankFileSection(FileTable):
         file: CSV or Parquet file, beside the design file.
         gear: of a file with flanks of both gears; the one that the table stands at where the key is left out.
         design: of a file with several designs.
-        revolutions: of the pinion, of a file with several lives.
+        revolutions: of the pinion, of a file with worn flanks after several numbers of them.
         method: of interpolation along the profile.
     """
 
@@ -197,7 +197,7 @@ class FlankFileSection(FileTable):
     method: str = entry(choice("linear", "natural_cubic", "monotonic"), "linear")
 
 
-def flank_part(section: FlankFileSection, folder: Path, base_radius: float | None) -> template.Part:
+def flank_template(section: FlankFileSection, folder: Path, base_radius: float | None) -> template.Template:
     """The modification of a gear that a table of a design file takes from a file in the folder.
 
     Args:
@@ -212,12 +212,12 @@ def flank_part(section: FlankFileSection, folder: Path, base_radius: float | Non
         if gear is None and _GEAR in rows[0]:
             gear = section.key.partition(".")[0]
         method: Any = section.method
-        rows = _at_life(_chosen(rows, {_GEAR: gear, "design": section.design}), section.revolutions)
+        rows = _at_revolutions(_chosen(rows, {_GEAR: gear, "design": section.design}), section.revolutions)
         flank, reach = flank_of_rows(rows, base_radius, method)
-    return template.Part(_FromFile(path.name, reach), {"flank": flank}, section.key)
+    return template.Template(_FromFile(path.name, reach), {"flank": flank}, section.key)
 
 
-def check_files(parts: Mapping[str, Sequence[template.Part]], pair: GearPair) -> None:
+def check_files(parts: Mapping[str, Sequence[template.Template]], pair: GearPair) -> None:
     """Refuses tables from files that are not on the flank of the gear, of the given name, that they stand at.
 
     Raises:
@@ -305,22 +305,22 @@ def _chosen(rows: Rows, wanted: Mapping[str, str | None]) -> Rows:
     return rows
 
 
-def _at_life(rows: Rows, revolutions: float | None) -> Rows:
-    """The rows of one life of worn flanks."""
-    if _LIFE not in rows[0]:
+def _at_revolutions(rows: Rows, revolutions: float | None) -> Rows:
+    """The rows of worn flanks after a number of revolutions."""
+    if _COUNT not in rows[0]:
         if revolutions is None:
             return rows
-        raise DesignFileError("", f"{_LIFE} = {revolutions:g} is not in the file, there is no column {_LIFE}")
-    lives = numbers_of(rows, _LIFE)
-    known = np.unique(lives)
+        raise DesignFileError("", f"{_COUNT} = {revolutions:g} is not in the file, there is no column {_COUNT}")
+    counts = numbers_of(rows, _COUNT)
+    known = np.unique(counts)
     if revolutions is None and len(known) == 1:
         return rows
-    held = f"{_LIFE} must be one of {', '.join(f'{life:g}' for life in known)}"
+    held = f"{_COUNT} must be one of {', '.join(f'{number:g}' for number in known)}"
     if revolutions is None:
         raise DesignFileError("", f"holds several: {held}")
-    wanted = np.isclose(lives, revolutions, rtol=_SAME_LIFE, atol=0.0)
+    wanted = np.isclose(counts, revolutions, rtol=_SAME_COUNT, atol=0.0)
     if not wanted.any():
-        raise DesignFileError("", f"{_LIFE} = {revolutions:g} is not in the file, {held}")
+        raise DesignFileError("", f"{_COUNT} = {revolutions:g} is not in the file, {held}")
     return [row for row, is_wanted in zip(rows, wanted) if is_wanted]
 
 
@@ -380,22 +380,22 @@ _GEARS = "pinion", "wheel"
 Worn = tuple[AbstractModification, AbstractModification]
 
 
-def write_worn(path: str | Path, lives: Mapping[str, WearHistory]) -> None:
+def write_worn(path: str | Path, histories: Mapping[str, WearHistory]) -> None:
     """Writes the worn flanks of all designs at every time step, one row per point of a flank, to all digits.
 
     `read_worn` gives the same flanks of all, `read_flank` one of them.
 
     Args:
         path: file to write: Parquet where its name ends in .parquet, otherwise CSV.
-        lives: wear histories by the name of the design.
+        histories: wear histories by the name of the design.
 
     Raises:
         ValueError: for no wear history, and when the file cannot be written.
     """
     path = Path(path)
-    if not lives:
-        raise ValueError("write_worn: lives must not be empty")
-    tables = [_columns(design, life) for design, life in lives.items()]
+    if not histories:
+        raise ValueError("write_worn: histories must not be empty")
+    tables = [_columns(design, history) for design, history in histories.items()]
     columns = {name: np.concatenate([table[name] for table in tables]) for name in tables[0]}
     with writing(path):
         if path.suffix == PARQUET:
@@ -415,21 +415,21 @@ def _write_parquet(path: Path, columns: Mapping[str, np.ndarray]) -> None:
     parquet.write_table(pyarrow.table({name: pyarrow.array(values.tolist()) for name, values in columns.items()}), path)
 
 
-def _columns(design: str, life: WearHistory) -> dict[str, np.ndarray]:
-    """Points of both flanks at every life, of shape (lives, gears, slices, points) before they stand in one row."""
-    depth = np.asarray(life.depth, float)
+def _columns(design: str, history: WearHistory) -> dict[str, np.ndarray]:
+    """Points of both flanks at every time step, as columns."""
+    depth = np.asarray(history.depth, float)
     total, corner = depth.sum(axis=2), depth[:, :, 1]
-    lengths = np.asarray(life.roll_length, float)
-    angles = np.stack([np.asarray(roll_angle(gear, of), float) for gear, of in zip(life.gears, life.roll_length)])
+    lengths = np.asarray(history.roll_length, float)
+    angles = np.stack([np.asarray(roll_angle(gear, of), float) for gear, of in zip(history.gears, history.roll_length)])
 
     def all_over(values: Any, *axes: int) -> np.ndarray:
         return np.broadcast_to(np.expand_dims(np.asarray(values), axes), total.shape).ravel()
 
     return {
         "design": all_over(design, 0, 1, 2, 3),
-        "revolutions": all_over(np.asarray(life.revolutions, float), 1, 2, 3),
+        "revolutions": all_over(np.asarray(history.revolutions, float), 1, 2, 3),
         "gear": all_over(_GEARS, 0, 2, 3),
-        "face_coordinate_mm": all_over(np.asarray(life.face_coordinate, float), 0, 3),
+        "face_coordinate_mm": all_over(np.asarray(history.face_coordinate, float), 0, 3),
         "roll_angle_deg": all_over(angles, 0, 2),
         "roll_length_mm": all_over(lengths, 0, 2),
         "wear_depth_um": total.ravel(),

@@ -31,16 +31,16 @@ from ..shafts import Section as ShaftPart
 from .errors import DesignFileError, check_file, referring, refused
 from .gears import MATERIAL, GearSection, Materials, fixed_gear, fixed_material
 from .table_keys import FileTable, entry, nested, section_of
-from .template import Part
-from .value_types import Kind, list_of, switch, table, text
+from .template import Template
+from .value_types import ValueType, list_of, switch, table, text
 
 
-def _bearing(key: str, value: Any) -> Part:
+def _bearing(key: str, value: Any) -> Template:
     cls = MatrixBearing if "stiffness" in table().read(key, value) else Bearing
     return nested(cls, open=False).read(key, value)
 
 
-def _several(cls: type[Any], *, empty: bool = True) -> Kind:
+def _several(cls: type[Any], *, empty: bool = True) -> ValueType:
     return list_of(nested(cls, open=False), empty=empty)
 
 
@@ -73,12 +73,12 @@ class ShaftSection(FileTable):
     """
 
     name: str = entry(text(), ...)
-    sections: list[Part] = entry(_several(ShaftPart, empty=False), ...)
-    bearings: list[Part] = entry(list_of(Kind("a table", _bearing)), ...)
+    sections: list[Template] = entry(_several(ShaftPart, empty=False), ...)
+    bearings: list[Template] = entry(list_of(ValueType("a table", _bearing)), ...)
     gears: list[_MountedGearSection] = entry(list_of(nested(_MountedGearSection), empty=True), [])
-    couplings: list[Part] = entry(_several(Coupling), [])
-    loads: list[Part] = entry(_several(ShaftLoad), [])
-    material: str | Part | None = entry(MATERIAL)
+    couplings: list[Template] = entry(_several(Coupling), [])
+    loads: list[Template] = entry(_several(ShaftLoad), [])
+    material: str | Template | None = entry(MATERIAL)
 
 
 class MeshSection(section_of(GearMesh, ("pinion", "wheel", "misalignment"), open=False)):  # type: ignore[misc]
@@ -92,7 +92,7 @@ class MeshSection(section_of(GearMesh, ("pinion", "wheel", "misalignment"), open
 
     pinion: str = entry(text(), ...)
     wheel: str = entry(text(), ...)
-    misalignment: Part | None = entry(nested(Misalignment, open=False))
+    misalignment: Template | None = entry(nested(Misalignment, open=False))
 
 
 class HousingSection(FileTable):

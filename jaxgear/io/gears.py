@@ -10,11 +10,11 @@ from ..microgeometry import AbstractModification
 from ..numerics import Number, UnitKey, changed, fields_of
 from ..numerics import real as real_number
 from .errors import DesignFileError, suggestion
-from .flanks import FlankFileSection, flank_part
+from .flanks import FlankFileSection, flank_template
 from .imperial import NORMAL_PITCH, PITCH
-from .table_keys import FileTable, as_field, decode, entry, nested, part_of, section_of
-from .template import Free, Part
-from .value_types import QUALITY_CLASS, Kind, either, list_of, not_of_kind, real, table, text
+from .table_keys import FileTable, as_field, decode, entry, nested, section_of, template_of
+from .template import Free, Template
+from .value_types import QUALITY_CLASS, ValueType, either, list_of, not_of_kind, real, table, text
 
 _STEEL = "STEEL"
 _DEFINED = ", or a table [materials.{}] with elastic_modulus, poisson_ratio and density; every steel deflects alike"
@@ -35,14 +35,17 @@ _GearKeys = section_of(Gear, ("material", "tooth_thickness_allowance"))
 
 _BACKLASH = Number("um", low=0.0)
 MATERIAL = either(text(), nested(Material), "the name of a material, or a table")
-Materials = Mapping[str, Part]
+Materials = Mapping[str, Template]
 
 
-def _modification(key: str, value: Any) -> Part | FlankFileSection:
+def _modification(key: str, value: Any) -> Template | FlankFileSection:
     given = table().read(key, value)
     if given.get("type") == "file":
         return decode(key, {name: item for name, item in given.items() if name != "type"}, FlankFileSection)
     return nested(AbstractModification).read(key, given)
+
+
+_MODIFICATIONS = list_of(ValueType("a table", _modification), empty=True)
 
 
 class GearSection(_ProfileKeys, _ThicknessKeys, _GearKeys):  # type: ignore[misc, valid-type]
@@ -72,12 +75,10 @@ class GearSection(_ProfileKeys, _ThicknessKeys, _GearKeys):  # type: ignore[misc
 
     source = Gear
 
-    material: str | Part | None = entry(MATERIAL)
+    material: str | Template | None = entry(MATERIAL)
     quality_class: int | None = entry(QUALITY_CLASS)
-    modification: list[Part | FlankFileSection] = entry(list_of(Kind("a table", _modification), empty=True), [])
-    coast_modification: list[Part | FlankFileSection] | None = entry(
-        list_of(Kind("a table", _modification), empty=True)
-    )
+    modification: list[Template | FlankFileSection] = entry(_MODIFICATIONS, [])
+    coast_modification: list[Template | FlankFileSection] | None = entry(_MODIFICATIONS)
 
 
 class PairSection(section_of(GearPair, ("pinion", "wheel"))):  # type: ignore[misc]
@@ -91,20 +92,20 @@ class PairSection(section_of(GearPair, ("pinion", "wheel"))):  # type: ignore[mi
     backlash: float | Free | None = entry(real(_BACKLASH, open=True))
 
 
-def materials_of(given: Mapping[str, Part] | None) -> Materials:
+def materials_of(given: Mapping[str, Template] | None) -> Materials:
     """The materials of a file by their names, with the library's."""
     if given and _STEEL in given:
         raise DesignFileError(f"materials.{_STEEL}", "is a material of the library, choose another name")
-    return {_STEEL: Part(Material, {}, "material"), **(given or {})}
+    return {_STEEL: Template(Material, {}, "material"), **(given or {})}
 
 
-def flank_of(section: GearSection, folder: Path, gear: Part, *, coast: bool) -> list[Part]:
+def flank_of(section: GearSection, folder: Path, gear: Template, *, coast: bool) -> list[Template]:
     """The modifications of the drive or coast flanks of a gear; paths begin in the folder."""
     own = section.coast_modification if coast else None
     given = section.modification if own is None else own
     has_files = any(isinstance(each, FlankFileSection) for each in given)
     base_radius = float(gear.build({}).base_radius) if has_files and not gear.free() else None
-    return [flank_part(each, folder, base_radius) if isinstance(each, FlankFileSection) else each for each in given]
+    return [flank_template(each, folder, base_radius) if isinstance(each, FlankFileSection) else each for each in given]
 
 
 def drawing_of(section: GearSection) -> dict[str, Any]:
@@ -113,7 +114,7 @@ def drawing_of(section: GearSection) -> dict[str, Any]:
     Limits are a list of the lower and the upper one.
     """
     given, units = section.fields, fields_of(ToothThickness)
-    found: dict[str, Any] = {} if isinstance(section.material, Part) else {"material": section.material or _STEEL}
+    found: dict[str, Any] = {} if isinstance(section.material, Template) else {"material": section.material or _STEEL}
     names = (name for name in units if name in given and not isinstance(given[name], Free))
     return found | {UnitKey(name, units[name].unit): given[name] for name in names}
 
@@ -132,21 +133,21 @@ def fixed_gear(section: GearSection, materials: Materials) -> Gear:
     for name in _WITHOUT_FLANKS:
         if name in section.fields:
             raise DesignFileError(f"{section.key}.{name}", "has no effect, only pinion and wheel have flanks")
-    return _fixed(gear_part(section, materials))
+    return _fixed(gear_template(section, materials))
 
 
-def gear_part(section: GearSection, materials: Materials) -> Part:
+def gear_template(section: GearSection, materials: Materials) -> Template:
     """A gear without its modifications."""
-    gear = part_of(section, Gear, without=("material",))
-    drawn = {**part_of(section, ToothThickness).fields, **part_of(section, ToothProfile).fields}
+    gear = template_of(section, Gear, without=("material",))
+    drawn = {**template_of(section, ToothThickness).fields, **template_of(section, ToothProfile).fields}
     if section.material is not None:
         gear = gear.having(material=_material(f"{section.key}.material", section.material, materials))
     # without any measure of a drawing the gear is the library's: messages then name its own fields
     return replace(gear.having(**drawn), make=drawn_gear if drawn else Gear)
 
 
-def _material(key: str, given: str | Part, materials: Materials) -> Part:
-    if isinstance(given, Part):
+def _material(key: str, given: str | Template, materials: Materials) -> Template:
+    if isinstance(given, Template):
         return given
     if given not in materials:
         known = suggestion(given, materials)
@@ -155,22 +156,22 @@ def _material(key: str, given: str | Part, materials: Materials) -> Part:
     return materials[given]
 
 
-def fixed_material(section: FileTable, given: str | Part | None, materials: Materials) -> Material:
+def fixed_material(section: FileTable, given: str | Template | None, materials: Materials) -> Material:
     """A material of numbers, of a table with such a key, by its name or described; steel for None."""
     return _fixed(_material(f"{section.key}.material", _STEEL if given is None else given, materials))
 
 
-def _fixed(part: Part) -> Any:
+def _fixed(part: Template) -> Any:
     for free in part.free():
         raise DesignFileError(free.key, not_of_kind("a number", free.name))
     return part.build({})
 
 
-def pair_of(section: PairSection, pinion: Part, wheel: Part) -> Part:
+def pair_of(section: PairSection, pinion: Template, wheel: Template) -> Template:
     """The pair of two gears, with what its table says."""
     _check_alike(pinion, wheel)
     gears = _of_opposite_hands({"pinion": pinion, "wheel": wheel})
-    pair = Part(GearPair, gears, section.key).having(**part_of(section, GearPair).fields)
+    pair = Template(GearPair, gears, section.key).having(**template_of(section, GearPair).fields)
     if section.backlash is None:
         return pair
     open_gears = [name for name in ("pinion", "wheel") if not set(pair.fields[name].fields) & set(_THICKNESS)]
@@ -185,7 +186,7 @@ def pair_of(section: PairSection, pinion: Part, wheel: Part) -> Part:
     return replace(pair.having(backlash=as_field(section.backlash, _BACKLASH), by=by), make=pair_with_backlash)
 
 
-def _check_alike(pinion: Part, wheel: Part) -> None:
+def _check_alike(pinion: Template, wheel: Template) -> None:
     """Refuses gears of different racks, before their other numbers are found to be impossible with them."""
     for name in ("module", "pressure_angle"):
         first, second = (gear.fields.get(name) for gear in (pinion, wheel))
@@ -197,7 +198,7 @@ def _check_alike(pinion: Part, wheel: Part) -> None:
             raise DesignFileError(f"{wheel.key}.{name}", problem)
 
 
-def _of_opposite_hands(gears: dict[str, Part]) -> dict[str, Part]:
+def _of_opposite_hands(gears: dict[str, Template]) -> dict[str, Template]:
     """Both gears, with the helix angle of either of them; gears without one are spur gears."""
     angles = {name: gear.fields[_HAND] for name, gear in gears.items() if _HAND in gear.fields}
     free = [name for name, angle in angles.items() if isinstance(angle, Free)]
@@ -212,7 +213,7 @@ def _of_opposite_hands(gears: dict[str, Part]) -> dict[str, Part]:
     return {name: gear if name == own else gear.having(**{_HAND: opposite}) for name, gear in gears.items()}
 
 
-def longest_path(pair: GearPair, part: Part, bounds: Mapping[str, tuple[float, float]]) -> GearPair:
+def longest_path(pair: GearPair, part: Template, bounds: Mapping[str, tuple[float, float]]) -> GearPair:
     """A pair with those values of its free numbers that make its contact lines run the farthest along the path.
 
     Args:

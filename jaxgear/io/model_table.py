@@ -7,7 +7,7 @@ from ..contact import Resolution, helical_slices
 from ..geometry import GearPair
 from . import template
 from .errors import DesignFileError, check_file, referring, refused
-from .table_keys import FileTable, entry, part_of, section_of
+from .table_keys import FileTable, entry, section_of, template_of
 from .value_types import choice, text
 
 # Slices where a modification varies along the face: the mean of a parabola over the middles of n slices is 1 / n^2 too
@@ -62,7 +62,7 @@ def resolution_of(section: FileTable, uneven: list[str], *, bent: bool, longest:
     if seen and sizes["slices"] == 1:
         problem = f"must be at least 2, 1 cannot show {seen[0]}"
         raise DesignFileError("resolution.slices", f"{problem} ({usual} where the key is left out)")
-    return template.Part(Resolution, sizes, "resolution").build({})
+    return template.Template(Resolution, sizes, "resolution").build({})
 
 
 FINITE_ELEMENTS = "finite_element"
@@ -80,29 +80,29 @@ _FREE = {
 }
 
 
-def model_part(section: ModelSection) -> template.Part:
+def model_template(section: ModelSection) -> template.Template:
     """The model as far as it needs no gears: all of it, or the plane of what `finite_elements` makes."""
     if section.structure == FINITE_ELEMENTS:
         others = set(section.fields) - {"structure", "plane", *_TABLES}
         if others:
             raise DesignFileError(f"model.{min(others)}", f'cannot be combined with structure = "{FINITE_ELEMENTS}"')
-        return template.Part(Compliance, {}, "model")
+        return template.Template(Compliance, {}, "model")
     section.refuse(_TABLES, f' without structure = "{FINITE_ELEMENTS}"')
     if section.preset == "default":
-        return part_of(section, Compliance)
+        return template_of(section, Compliance)
     given = set(section.fields) - {"preset", "structure"}
     if given:
         raise DesignFileError(f"model.{min(given)}", 'cannot be combined with preset = "legacy"')
-    return template.Part(legacy_compliance, {}, "model")
+    return template.Template(legacy_compliance, {}, "model")
 
 
 def with_tables(
-    model: template.Part, section: ModelSection, folder: Path, pair: template.Part, middle: GearPair
-) -> template.Part:
+    model: template.Template, section: ModelSection, folder: Path, pair: template.Template, middle: GearPair
+) -> template.Template:
     """The model, with the tables of the gears where the file asks for finite elements.
 
     Args:
-        model: what `model_part` made.
+        model: what `model_template` made.
         section: what the file says.
         folder: of the design file, in which paths begin.
         pair: gears whose numbers may be variables.
@@ -123,12 +123,12 @@ def with_tables(
         with referring(f"model.{name}", path.name):
             check_file(path)
     tabulated = refused("model", finite_element_compliance, middle, section.plane or "auto", **paths)
-    return template.Part(_as_it_is, {"compliance": tabulated}, "model")
+    return template.Template(_unchanged, {"compliance": tabulated}, "model")
 
 
 def _gears(pair: GearPair):
     return pair.pinion, pair.wheel
 
 
-def _as_it_is(compliance: AbstractCompliance) -> AbstractCompliance:
+def _unchanged(compliance: AbstractCompliance) -> AbstractCompliance:
     return compliance

@@ -36,7 +36,7 @@ from .value_types import (
     LEVEL,
     SEED,
     WEIGHTS,
-    Kind,
+    ValueType,
     choice,
     count,
     either,
@@ -168,7 +168,7 @@ class OptimizeSection(FurtherTable):
     constraint: list[_ConstraintSection] = entry(list_of(nested(_ConstraintSection), empty=True), [])
 
     @classmethod
-    def every_key(cls) -> dict[str, Kind]:
+    def every_key(cls) -> dict[str, ValueType]:
         """Keys of the table, with the options of the methods that are known by now."""
         options = method_options().items()
         return cls.keys | {

@@ -13,7 +13,7 @@ from ..numerics import Number
 from ..wear import Wear
 from .design_file import DesignFile
 from .errors import DesignFileError
-from .table_keys import entry, part_of, section_of
+from .table_keys import entry, section_of, template_of
 from .tables import FILE, FurtherTable, SettingsTable
 from .value_types import WEIGHTS, choice, count, list_of, outside, positive
 from .variables import increasing
@@ -63,7 +63,7 @@ class DynamicsSection(FurtherTable, section_of(Dynamics, ("mesh_frequencies",), 
             DesignFileError: for speeds that are no range, and a run-up of less than a mesh cycle for every sample.
         """
         frequencies = np.linspace(*_frequencies(design, self), number or self.number)
-        settings = part_of(self, Dynamics).having(mesh_frequencies=frequencies).build({})
+        settings = template_of(self, Dynamics).having(mesh_frequencies=frequencies).build({})
         if self.run_up is not None:
             cycles = self.run_up * float(settings.mesh_frequencies[0] + settings.mesh_frequencies[-1]) / 2
             if cycles < SAMPLES:
@@ -141,7 +141,7 @@ class WearSection(FurtherTable, section_of(Wear, ("dynamics", "loads"), open=Fal
             design: the design file.
             vibrates: True if the motion counts under a static line load too.
         """
-        part = part_of(self, Wear)
+        part = template_of(self, Wear)
         if vibrates or self.line_load == "dynamic":
             speed = design.speed if self.speeds is None else self.speeds
             for known, name in ((design.tables.get("dynamics"), "the table [dynamics]"), (speed, "load.speed")):

@@ -21,12 +21,12 @@ from ..numerics import Number, fields_of
 from ..numerics import real as real_number
 from . import imperial
 from .errors import DesignFileError, check_known, join, not_known
-from .template import Free, Part
+from .template import Free, Template
 from .trade_words import unknown_key
-from .value_types import Kind, choice, either, list_of, not_of_kind, real, rows_of, switch, table, text
+from .value_types import ValueType, choice, either, list_of, not_of_kind, real, rows_of, switch, table, text
 
 
-def entry(kind: Kind, default: Any = None) -> Any:
+def entry(kind: ValueType, default: Any = None) -> Any:
     """Declares a key of a table as an attribute of its class; a default of `...` makes it a required key."""
     return dataclasses.replace(kind, default=default)
 
@@ -43,7 +43,7 @@ class FileTable:
         written: imperial keys that the file has in place of those of the table, by these.
     """
 
-    keys: ClassVar[dict[str, Kind]] = {}
+    keys: ClassVar[dict[str, ValueType]] = {}
     source: ClassVar[Any] = None
     table: ClassVar[str] = ""
     key: str = ""
@@ -51,7 +51,7 @@ class FileTable:
     written: Mapping[str, str] = {}
 
     def __init_subclass__(cls) -> None:
-        own = {name: value for name, value in vars(cls).items() if isinstance(value, Kind)}
+        own = {name: value for name, value in vars(cls).items() if isinstance(value, ValueType)}
         inherited = [vars(base).get("keys", {}) for base in reversed(cls.__mro__[1:])]
         cls.keys = functools.reduce(operator.or_, [*inherited, own])
 
@@ -63,7 +63,7 @@ class FileTable:
                 setattr(self, name, given.get(name, None if allowed.default is ... else allowed.default))
 
     @classmethod
-    def every_key(cls) -> dict[str, Kind]:
+    def every_key(cls) -> dict[str, ValueType]:
         """Keys by their names, by default those of the attributes."""
         return cls.keys
 
@@ -109,25 +109,25 @@ def decode(key: str, data: object, section: type[S]) -> S:
     return made
 
 
-def nested(cls: type[Any], *, open: bool = True) -> Kind:
+def nested(cls: type[Any], *, open: bool = True) -> ValueType:
     """A table with the keys of a class, within another one.
 
     Of an abstract class its `type` says which class derived from it is meant, or its name alone where that says all.
 
     Args:
-        cls: class of a table, which is read as an object of it, or of the library, which is read as a `Part`.
+        cls: class of a table, which is read as an object of it, or of the library, which is read as a `Template`.
         open: the names of variables may stand for numbers of a class of the library.
     """
     if issubclass(cls, FileTable):
-        return Kind("a table", lambda key, value: decode(key, value, cls), container=dict)
+        return ValueType("a table", lambda key, value: decode(key, value, cls), container=dict)
     if not inspect.isabstract(cls):
         section: type[FileTable] = section_of(cls, open=open)  # type: ignore[arg-type]
-        return Kind("a table", lambda key, value: part_of(decode(key, value, section), cls), container=dict)
+        return ValueType("a table", lambda key, value: template_of(decode(key, value, section), cls), container=dict)
     kind = either(text(empty=True), table(), "the name of a type, or a table")
     return dataclasses.replace(kind, read=lambda key, value: _of_family(key, kind.read(key, value), cls))
 
 
-def _of_family(key: str, given: dict[str, Any] | str, base: type[eqx.Module]) -> Part:
+def _of_family(key: str, given: dict[str, Any] | str, base: type[eqx.Module]) -> Template:
     known = family(base)
     if isinstance(given, str):
         check_known(key, given, known)
@@ -176,15 +176,15 @@ def section_of(
     return type(cls.__name__, (FileTable,), {**keys, **said})
 
 
-def part_of(section: FileTable, cls: type[eqx.Module], *, without: tuple[str, ...] = ()) -> Part:
+def template_of(section: FileTable, cls: type[eqx.Module], *, without: tuple[str, ...] = ()) -> Template:
     """An object of a class from those keys of a table that are its fields, `without` some of them."""
     numbers, names = fields_of(cls), {field.name for field in dataclasses.fields(cls)} - set(without)
     given = {name: value for name, value in section.fields.items() if name in names}
-    return Part(cls, {name: as_field(value, numbers.get(name)) for name, value in given.items()}, section.key)
+    return Template(cls, {name: as_field(value, numbers.get(name)) for name, value in given.items()}, section.key)
 
 
 def as_field(value: Any, number: Number | None) -> Any:
-    """Value as a field of a `Part`: numbers become arrays."""
+    """Value as a field of a `Template`: numbers become arrays."""
     if isinstance(value, list):
         return [as_field(item, number) for item in value]
     if number is None or number.static:
@@ -233,8 +233,8 @@ def summary(of: object) -> str:
     return inspect.cleandoc(of.__doc__ or "").partition("\n\n")[0].replace("\n", " ")
 
 
-def _kind(cls, field: dataclasses.Field[Any], most: int | None, open: bool) -> Kind | None:
-    """Kind of value that the key of a field takes; None for a field without a key."""
+def _kind(cls, field: dataclasses.Field[Any], most: int | None, open: bool) -> ValueType | None:
+    """ValueType of value that the key of a field takes; None for a field without a key."""
     number = fields_of(cls).get(field.name)
     if number is not None:
         return _number(number if most is None else dataclasses.replace(number, high=most), open)
@@ -249,7 +249,7 @@ def _kind(cls, field: dataclasses.Field[Any], most: int | None, open: bool) -> K
     return plain.get(hint) if isinstance(hint, type) else None
 
 
-def _number(number: Number, open: bool) -> Kind | None:
+def _number(number: Number, open: bool) -> ValueType | None:
     if not number.checked:
         return None
     kind = real(number, open=open and not (number.static or number.whole))

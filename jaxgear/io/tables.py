@@ -17,15 +17,15 @@ from ..metrics import Finding, Quantity
 from ..numerics import Checked, Number
 from ..provided import provided
 from .errors import DesignFileError, join, referring
-from .table_keys import FileTable, decode, descendants, entry, part_of, section_of
+from .table_keys import FileTable, decode, descendants, entry, section_of, template_of
 from .template import Free
 from .toml import read
-from .value_types import Kind, list_of, positive, real, text
+from .value_types import ValueType, list_of, positive, real, text
 
 FILE = "file"  # key of a table that stands in a file of its own
 
 
-def _either_side() -> Kind:
+def _either_side() -> ValueType:
     """A torque of either sign, but not zero; a variable stands for a positive one."""
     amount = real(Number("N m", low=0.0, open_low=True), open=True)
 
@@ -33,7 +33,7 @@ def _either_side() -> Kind:
         negative = isinstance(value, int | float) and value < 0
         return -amount.read(key, -value) if negative else amount.read(key, value)
 
-    return Kind(amount.words, read, Number("N m"))
+    return ValueType(amount.words, read, Number("N m"))
 
 
 class LoadSection(section_of(OperatingPoint)):  # type: ignore[misc]
@@ -82,7 +82,7 @@ class FurtherTable(FileTable):
         return decode(cls.table, given, cls)
 
     @property
-    def held(self) -> object:
+    def value(self) -> object:
         """The object that `DesignFile.tables` holds for the table, by default the table itself."""
         return self
 
@@ -103,7 +103,7 @@ class FurtherTable(FileTable):
         return ()
 
     def part(self, design: Any, name: str, cycle: MeshCycle) -> object:
-        """Tables, chapters and data that the table adds to an analysis, a `report.Part`; by default None.
+        """Tables, chapters and data that the table adds to an analysis, a `report.Template`; by default None.
 
         Args:
             design: the `DesignFile`.
@@ -141,9 +141,9 @@ class SettingsTable(FurtherTable):
     file: str | None = entry(text())
 
     @property
-    def held(self) -> object:
+    def value(self) -> object:
         """The settings."""
-        return part_of(self, self.source).build({})
+        return template_of(self, self.source).build({})
 
     @classmethod
     def read(cls, given: Mapping[str, Any], folder: Path) -> Self:

@@ -22,11 +22,11 @@ from .flanks import check_flank, flank_of_rows, numbers_of
 from .rows import read_rows
 from .table_keys import FileTable, entry, nested, section_of
 from .tables import FurtherTable
-from .template import Part
-from .value_types import QUALITY_CLASS, SEED, Kind, choice, count, list_of, positive, real, text
+from .template import Template
+from .value_types import QUALITY_CLASS, SEED, ValueType, choice, count, list_of, positive, real, text
 
 _GEAR, _COUNT = choice("pinion", "wheel", "hunting"), count(1, MOST_WINDOWS)
-_OVER = Kind(
+_OVER = ValueType(
     '"pinion", "wheel", "hunting" or a number of base pitches',
     lambda key, value: (_GEAR if isinstance(value, str) else _COUNT).read(key, value),
     _COUNT.number,
@@ -63,7 +63,7 @@ class _GearTeethSection(FileTable):
     profile_slope: list[float] | None = entry(_AMOUNTS)
     helix_slope: list[float] | None = entry(_AMOUNTS)
     run_out: float | None = entry(positive("um"))
-    undulations: list[Part] = entry(list_of(nested(Undulation, open=False)), [])
+    undulations: list[Template] = entry(list_of(nested(Undulation, open=False)), [])
     file: str | None = entry(text())
     flanks: str | None = entry(text())
     quality_class: int | None = entry(QUALITY_CLASS)

@@ -35,11 +35,11 @@ class Free:
     opposite: bool = False
 
 
-class Part(eqx.Module):
+class Template(eqx.Module):
     """An object of the library: its class, and those of its fields that the file gives.
 
-    A field is a number, a `Free` number, a list of both, another part, or a choice among strings. Numbers are arrays:
-    a program that is compiled for a part serves the same part with other numbers.
+    A field is a number, a `Free` number, a list of both, another template, or a string. Numbers are arrays, so that a
+    compiled program serves the same template with other numbers.
     """
 
     make: Callable[..., eqx.Module] = eqx.field(static=True)
@@ -59,14 +59,14 @@ class Part(eqx.Module):
             text = problem(error)
             field = _FIELD.match(text)
             owner = self.fields.get(field["part"]) if field and field["part"] else self
-            if field and isinstance(owner, Part):
+            if field and isinstance(owner, Template):
                 said = text[field.end() :]
                 if field["name"] in owner.fields or said.startswith("missing"):
                     raise DesignFileError(join(owner.key, field["name"]), said) from error
             raise DesignFileError(self.key, text) from error
 
-    def having(self, **fields: object) -> "Part":
-        """Copy of the part with further fields."""
+    def having(self, **fields: object) -> "Template":
+        """Copy of the template with further fields."""
         return dataclasses.replace(self, fields={**self.fields, **fields})
 
     def free(self) -> list[Free]:
@@ -74,14 +74,14 @@ class Part(eqx.Module):
         return _open([*self.fields.values()])
 
 
-def build(parts: list[Part], parameters: Mapping[str, Any]) -> AbstractModification:
-    """The sum of the parts."""
-    terms = [part.build(parameters) for part in parts]
+def build(templates: list[Template], parameters: Mapping[str, Any]) -> AbstractModification:
+    """Sum of the modifications of several templates."""
+    terms = [template.build(parameters) for template in templates]
     return reduce(add, terms) if terms else NoModification()
 
 
 def _open(value) -> list[Free]:
-    if isinstance(value, Part):
+    if isinstance(value, Template):
         return value.free()
     if isinstance(value, list):
         return [free for item in value for free in _open(item)]
@@ -89,7 +89,7 @@ def _open(value) -> list[Free]:
 
 
 def _fill(value, parameters):
-    if isinstance(value, Part):
+    if isinstance(value, Template):
         return value.build(parameters)
     if isinstance(value, Free):
         return -parameters[value.name] if value.opposite else parameters[value.name]

@@ -77,8 +77,8 @@ def allowed(number: Number) -> str:
 
 
 @dataclass(frozen=True, eq=False)
-class Kind:
-    """Kind of value that a key takes.
+class ValueType:
+    """ValueType of value that a key takes.
 
     Attributes:
         words: allowed values in words, for messages and the reference.
@@ -97,7 +97,7 @@ class Kind:
     meaning: str = ""
 
 
-def real(limits: Number = Number(), *, open: bool = False, plausible: bool = True) -> Kind:
+def real(limits: Number = Number(), *, open: bool = False, plausible: bool = True) -> ValueType:
     """A number.
 
     Args:
@@ -119,37 +119,37 @@ def real(limits: Number = Number(), *, open: bool = False, plausible: bool = Tru
             raise DesignFileError(key, problem + remark_on(key, value))
         return value if limits.whole else float(value)
 
-    return Kind(words, read, limits)
+    return ValueType(words, read, limits)
 
 
-def count(low: int, high: int) -> Kind:
+def count(low: int, high: int) -> ValueType:
     """A whole number; the upper limits keep a slip of the finger from filling the memory or compiling for hours."""
     return real(Number(low=low, high=high, whole=True))
 
 
-def positive(unit: str) -> Kind:
+def positive(unit: str) -> ValueType:
     """A number greater than zero."""
     return real(Number(unit, low=0.0, open_low=True))
 
 
-def text(*, empty: bool = False) -> Kind:
+def text(*, empty: bool = False) -> ValueType:
     """A string; `empty` allows the empty one."""
     return _plain("a string", lambda value: _no_text(value) or ("" if value or empty else '"" is empty'))
 
 
-def switch() -> Kind:
+def switch() -> ValueType:
     """True or false."""
     words = "true or false"
     return _plain(words, lambda value: "" if isinstance(value, bool) else not_of_kind(words, value))
 
 
-def choice(*names: str) -> Kind:
+def choice(*names: str) -> ValueType:
     """One of several names."""
     words = "one of " + ", ".join(f'"{name}"' for name in names)
     return _plain(words, lambda value: _no_text(value) or ("" if value in names else not_known(value, names)))
 
 
-def list_of(item: Kind, *, length: int | None = None, empty: bool = False) -> Kind:
+def list_of(item: ValueType, *, length: int | None = None, empty: bool = False) -> ValueType:
     """A list of a length, None for any; `empty` allows the empty one."""
 
     def read(key: str, value: Any) -> list[Any]:
@@ -158,10 +158,10 @@ def list_of(item: Kind, *, length: int | None = None, empty: bool = False) -> Ki
             raise DesignFileError(key, f"must be a list of length {length}, not {len(value)}")
         return [item.read(f"{key}[{index}]", each) for index, each in enumerate(value)]
 
-    return Kind(f"a list, each {item.words}", read, item.number, list)
+    return ValueType(f"a list, each {item.words}", read, item.number, list)
 
 
-def rows_of(item: Kind) -> Kind:
+def rows_of(item: ValueType) -> ValueType:
     """A list of rows, lists that are as long as the first."""
     rows = list_of(list_of(item))
 
@@ -176,17 +176,17 @@ def rows_of(item: Kind) -> Kind:
     return dataclasses.replace(rows, read=read)
 
 
-def table(item: Kind | None = None) -> Kind:
+def table(item: ValueType | None = None) -> ValueType:
     """A table with keys of its own and values of one kind; None for a table that is looked into later."""
 
     def read(key: str, value: Any) -> dict[str, Any]:
         _check_container(key, value, dict, empty=item is None)
         return value if item is None else {name: item.read(join(key, name), each) for name, each in value.items()}
 
-    return Kind("a table", read, None if item is None else item.number, dict)
+    return ValueType("a table", read, None if item is None else item.number, dict)
 
 
-def either(plain: Kind, many: Kind, words: str) -> Kind:
+def either(plain: ValueType, many: ValueType, words: str) -> ValueType:
     """A plain value, or a list or table."""
 
     def read(key: str, value: Any) -> Any:
@@ -194,7 +194,7 @@ def either(plain: Kind, many: Kind, words: str) -> Kind:
             raise DesignFileError(key, f"must be {words}")
         return (many if isinstance(value, list | dict) else plain).read(key, value)
 
-    return Kind(words, read, plain.number, many.container)
+    return ValueType(words, read, plain.number, many.container)
 
 
 def not_of_kind(wanted: str, value: object) -> str:
@@ -202,7 +202,7 @@ def not_of_kind(wanted: str, value: object) -> str:
     return f"must be {wanted}, not {_kind(value)}"
 
 
-def _plain(words: str, problem: Callable[[Any], str]) -> Kind:
+def _plain(words: str, problem: Callable[[Any], str]) -> ValueType:
     """A value that is taken as it is, unless there is a problem with it."""
 
     def read(key: str, value: Any) -> Any:
@@ -210,7 +210,7 @@ def _plain(words: str, problem: Callable[[Any], str]) -> Kind:
             raise DesignFileError(key, found)
         return value
 
-    return Kind(words, read)
+    return ValueType(words, read)
 
 
 def _no_text(value: Any) -> str:

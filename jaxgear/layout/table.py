@@ -10,7 +10,7 @@ from ..io.errors import DesignFileError, refused
 from ..io.gears import both_classes
 from ..io.table_keys import FileTable, entry, nested
 from ..io.tables import FurtherTable
-from ..io.template import Part
+from ..io.template import Template
 from ..io.value_types import QUALITY_CLASSES, choice, count, either, list_of, positive, real, switch
 from ..numerics import Number
 from ..shafts import Misalignment
@@ -104,7 +104,7 @@ class LayoutSection(FurtherTable):
     drive_only = classified = True
 
     quality_class: int | list[int] | None = entry(QUALITY_CLASSES)
-    misalignment: str | Part | None = entry(_AXES)
+    misalignment: str | Template | None = entry(_AXES)
     gear: str = entry(choice("pinion", "wheel"), "wheel")
     direction: str = entry(choice("counterclockwise", "clockwise"), "counterclockwise")
     further_crowning: str = entry(choice("rule", "least"), "rule")
@@ -183,9 +183,9 @@ class LayoutSection(FurtherTable):
         return {"[layout.profile]": ProfileSection}
 
 
-def _axes(section: str | Part | None, width: float):
+def _axes(section: str | Template | None, width: float):
     """Limits of the axes, as `flank_line_tolerance` takes them."""
-    if not isinstance(section, Part):
+    if not isinstance(section, Template):
         return section
     key, amounts = section.key, {name: float(value) for name, value in section.fields.items()}
     span = amounts.pop("bearing_span", None)

@@ -30,7 +30,7 @@ _ISO_KELVIN, _ISO_REFERENCE, _ISO_SLOPE = 273.0, 311.0, 516.0
 _DENSITY_REFERENCE, _DENSITY_SLOPE = 289.0, 0.7  # K, kg/(m3 K)
 
 
-class BaseOil(NamedTuple):
+class _BaseOil(NamedTuple):
     """Constants of a kind of oil.
 
     Attributes:
@@ -45,10 +45,10 @@ class BaseOil(NamedTuple):
 
 
 # friction factors of ISO/TR 13989-1; of polyglycols the one that does not dissolve in water
-BASES: Mapping[str, BaseOil] = {
-    "mineral": BaseOil(2.657e-8, 0.1348, 1.0),
-    "pao": BaseOil(1.466e-8, 0.0507, 0.8),
-    "pag": BaseOil(1.392e-8, 0.1572, 0.7),
+BASES: Mapping[str, _BaseOil] = {
+    "mineral": _BaseOil(2.657e-8, 0.1348, 1.0),
+    "pao": _BaseOil(1.466e-8, 0.0507, 0.8),
+    "pag": _BaseOil(1.392e-8, 0.1572, 0.7),
 }
 
 

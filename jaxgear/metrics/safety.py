@@ -88,7 +88,7 @@ def safety_factor(borne: Real, reached: Real) -> Real:
 
 
 def _safety(strength: Strength, name: Mode, stress: Any) -> tuple[Real, Real]:
-    pinion, wheel = strengths_of(strength, name)
+    pinion, wheel = _strengths_of(strength, name)
     factor = _stress_factor(strength, name)
     return safety_factor(pinion, factor * stress.pinion), safety_factor(wheel, factor * stress.wheel)
 
@@ -122,7 +122,7 @@ def local_root_safety(cycle: MeshCycle, strength: Strength) -> tuple[Load, Load]
 @over_batch
 def pressure_safety(cycle: MeshCycle, strength: Strength) -> Load:
     """p_lim / p at every contact, on the flanks and at the tip edges."""
-    limit = given_strength(strength, "pressure")
+    limit = _given_strength(strength, "pressure")
     return safety_factor(limit, jnp.sqrt(strength.load_factor) * (cycle.contact_pressure + cycle.corner_pressure))
 
 
@@ -133,7 +133,7 @@ def micropitting_safety(cycle: MeshCycle, lubricant: Lubricant) -> Load:
     Raises:
         ValueError: for a lubricant without `permissible_film`.
     """
-    limit = given_strength(lubricant, "permissible_film")
+    limit = _given_strength(lubricant, "permissible_film")
     return safety_factor(specific_film_thickness(cycle, lubricant), limit)
 
 
@@ -149,18 +149,18 @@ def scuffing_safety(cycle: MeshCycle, lubricant: Lubricant) -> Load:
     References:
         ISO/TS 6336-20 (ISO/TR 13989-1), flash temperature method.
     """
-    limit = given_strength(lubricant, "scuffing_temperature")
+    limit = _given_strength(lubricant, "scuffing_temperature")
     oil = lubricant.temperature
     return safety_factor(limit - oil, contact_temperature(cycle, lubricant) - oil)
 
 
-def strengths_of(strength: Strength, name: str) -> tuple[Scalar, Scalar]:
+def _strengths_of(strength: Strength, name: str) -> tuple[Scalar, Scalar]:
     """Strength `name` of pinion and wheel, the wheel's by default the pinion's; raises a `ValueError` without any."""
-    pinion, wheel = given_strength(strength, name), getattr(strength, f"wheel_{name}")
+    pinion, wheel = _given_strength(strength, name), getattr(strength, f"wheel_{name}")
     return pinion, pinion if wheel is None else wheel
 
 
-def given_strength(settings: Checked, name: str) -> Scalar:
+def _given_strength(settings: Checked, name: str) -> Scalar:
     """A number of settings; raises a `ValueError` where it is not given."""
     value = getattr(settings, name)
     if value is None:
@@ -218,6 +218,6 @@ def sn_lines(strength: Strength, name: Mode) -> tuple[SNLine, SNLine]:
     Raises:
         ValueError: for a strength without that S-N curve.
     """
-    curves = zip(*(strengths_of(strength, each) for each in (name, f"{name}_exponent", f"{name}_cycles")))
+    curves = zip(*(_strengths_of(strength, each) for each in (name, f"{name}_exponent", f"{name}_cycles")))
     pinion, wheel = (SNLine.power_law(limit, cycles, exponent) for limit, exponent, cycles in curves)
     return pinion, wheel

@@ -238,7 +238,7 @@ def root_factors(gear: Gear, roll_length: Real) -> RootFactors:
     return RootFactors(form, correction, arm, angle, 2 * jnp.hypot(gear.base_radius, roll_length), notch, section)
 
 
-def root_stress_per_load(gear: Gear, roll_length: Real) -> Real:
+def _root_stress_per_load(gear: Gear, roll_length: Real) -> Real:
     """cos(alpha_t) / m_n Y_F Y_S: root stress by a line load on the line of action at a roll length [MPa mm/N]."""
     return _per_load(gear, root_factors(gear, roll_length))
 
@@ -302,7 +302,7 @@ def root_stress(cycle: MeshCycle) -> RootStress:
     """
 
     def stress(side: Side) -> Load:
-        return cycle.line_load * root_stress_per_load(side.gear, side.contact_roll_length)
+        return cycle.line_load * _root_stress_per_load(side.gear, side.contact_roll_length)
 
     return RootStress(*(stress(side) for side in cycle.sides))
 

@@ -65,7 +65,6 @@ from .risk import Worst as Worst
 from .safe import gauss_legendre as gauss_legendre
 from .safe import log as log
 from .safe import safe_divide as safe_divide
-from .safe import safe_log as safe_log
 from .safe import safe_power as safe_power
 from .safe import safe_sqrt as safe_sqrt
 from .safe import stored as stored

@@ -56,7 +56,7 @@ def digest(text: str, arrays: Iterable[Any] = ()) -> str:
     return found.hexdigest()
 
 
-class KeptFiles:
+class FileStore:
     """Contents kept as files of a folder, named by a checksum of everything that they depend on.
 
     Args:

@@ -30,11 +30,11 @@ def inverse_of(
         [*(mask[i] * mask[j] * compliance[i, j] for j in range(i)), compliance[i, i] + slope[i]]
         for i in range(len(mask))
     ]
-    return bordered(lower, mask)
+    return _bordered(lower, mask)
 
 
-def bordered(lower: list[list[Array]], mask: Sequence[Array | float]) -> tuple[list[list[Array]], list[Array]]:
-    """Inverse of a symmetric, positive definite matrix, bordered row by row, and the inverse pivots.
+def _bordered(lower: list[list[Array]], mask: Sequence[Array | float]) -> tuple[list[list[Array]], list[Array]]:
+    """Inverse of a symmetric, positive definite matrix, _bordered row by row, and the inverse pivots.
 
     Args:
         lower: its rows up to the diagonal.
@@ -56,6 +56,6 @@ def bordered(lower: list[list[Array]], mask: Sequence[Array | float]) -> tuple[l
 def small_inverse(matrix: Float[Array, "rows rows positions"]) -> Float[Array, "rows rows positions"]:
     """Inverse of a symmetric, positive definite matrix at every position."""
     count = len(matrix)
-    inverse, _ = bordered([[matrix[i, j] for j in range(i + 1)] for i in range(count)], [1.0] * count)
+    inverse, _ = _bordered([[matrix[i, j] for j in range(i + 1)] for i in range(count)], [1.0] * count)
     whole = jnp.stack([jnp.stack(row) for row in inverse])
     return whole / unit(whole)

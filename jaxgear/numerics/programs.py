@@ -87,12 +87,12 @@ def _jitted(function: Callable[_Given, _Found], always: bool) -> Callable[_Given
 
     @functools.wraps(function)
     def run(*args: _Given.args, **options: _Given.kwargs) -> _Found:
-        return (quick() if is_quick(always) and is_eager() else full)(*args, **options)
+        return (quick() if _is_quick(always) and is_eager() else full)(*args, **options)
 
     return run
 
 
-def is_quick(always: bool) -> bool:
+def _is_quick(always: bool) -> bool:
     """Whether a function is compiled quickly, by what `quick_jit` was told of it."""
     return (always or _everything) and quick_options() is not None
 
@@ -103,10 +103,10 @@ def quick_options() -> dict[str, Any] | None:
     given = os.environ.get("XLA_FLAGS", "")
     if jax.default_backend() != "cpu" or any(option in given for option in OPTIONS):
         return None
-    return known_of(OPTIONS)
+    return supported_options(OPTIONS)
 
 
-def known_of(options: dict[str, Any]) -> dict[str, Any]:
+def supported_options(options: dict[str, Any]) -> dict[str, Any]:
     """The given options without those that the compiler does not know: one of these would make it refuse programs."""
     if _compiles(options):
         return options
@@ -219,7 +219,7 @@ class ProgramStore:
             return None
         if known is None:
             known = self._programs[key] = self._made(
-                function, jax.tree.unflatten(tree, fixed), str(precision), quick_options() if is_quick(quick) else None
+                function, jax.tree.unflatten(tree, fixed), str(precision), quick_options() if _is_quick(quick) else None
             )
         return known, [leaf for leaf, shape in zip(leaves, fixed) if isinstance(shape, _Shape)]
 
@@ -397,7 +397,7 @@ def _loaded(code: tuple[bytes, Any, Any], devices: list[jax.Device]) -> _Run:
     return deserialize_and_load(program, given, found, execution_devices=devices)
 
 
-class Recipe(pickle.Pickler):
+class _Recipe(pickle.Pickler):
     """Writes what a program is made of, to be compared: functions by their names and what they enclose.
 
     Equal objects are written alike, whether they are one object or two, which differs from process to process.
@@ -424,7 +424,7 @@ def _recipe(made_of: Any) -> bytes | None:
     """Description of what a program is made of, as bytes; None where it cannot be written."""
     written = io.BytesIO()
     try:
-        Recipe(written).dump(made_of)
+        _Recipe(written).dump(made_of)
     except (*_UNFIT, RecursionError):
         return None
     return written.getvalue()

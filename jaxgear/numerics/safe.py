@@ -37,12 +37,6 @@ def safe_sqrt(x: Given) -> Real:
     return jnp.where(ok, jnp.sqrt(jnp.where(ok, x, jnp.ones_like(x))), jnp.zeros_like(x))
 
 
-def safe_log(x: Given, default: Given = 0.0) -> Real:
-    """log(x) for x > 0, else `default` with zero gradient."""
-    ok = x > 0
-    return jnp.where(ok, jnp.log(jnp.where(ok, x, jnp.ones_like(x))), default)
-
-
 def safe_power(x: Given, exponent: Given) -> Real:
     """x**exponent for x > 0, else 0 with zero gradient (also with respect to the exponent)."""
     ok = x > 0

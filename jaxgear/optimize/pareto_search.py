@@ -40,7 +40,7 @@ class Chebyshev(AbstractScalarization):
         return factor, -factor * low
 
 
-class _Met:
+class _Archive:
     """Non-dominated designs so far that meet the constraints."""
 
     def __init__(self, record: Record, frame: tuple[np.ndarray, np.ndarray] | None = None) -> None:
@@ -180,14 +180,14 @@ class Pareto(Checked):
     points: int = count(low=2, high=4096, default=32)
     steps: int = count(high=100_000, default=20)
 
-    def search(self, problem: Problem, record: Record) -> "_Met":
+    def search(self, problem: Problem, record: Record) -> "_Archive":
         """Run all rounds; returns at most `points` designs.
 
         Raises:
             ValueError: for fewer points than objectives.
             RuntimeError: if no design meets the constraints.
         """
-        met, objectives = _Met(record), len(problem.objectives)
+        archive, objectives = _Archive(record), len(problem.objectives)
         if self.points < objectives:
             raise ValueError(f"Pareto: points = {self.points} must be at least the number of objectives, {objectives}")
         # in blocks: every other point of the Halton sequence covers half of the box only
@@ -196,19 +196,20 @@ class Pareto(Checked):
         record.linearizer = Linearizer(problem, self.points)
         points = list(start_points(problem, self.points))
         for number in range(_ROUNDS):
-            ways = [Chebyshev(weight, met.frame) for weight in (spread if number else ends)]
-            if number and met.found:
-                points = [met.best(way) for way in ways]
+            ways = [Chebyshev(weight, archive.frame) for weight in (spread if number else ends)]
+            if number and archive.found:
+                points = [archive.best(way) for way in ways]
             searches = [Search(point, way) for point, way in zip(points, ways)]
-            follow(record.linearizer, met, searches, steps=self.steps, rtol=_RTOL, round_of=(number, _ROUNDS))
-        met.end(self.points)
-        return met
+            follow(record.linearizer, archive, searches, steps=self.steps, rtol=_RTOL, round_of=(number, _ROUNDS))
+        archive.end(self.points)
+        return archive
 
-    def end_on(self, mesh: Mesh, met: "_Met") -> tuple["_Met", bool]:
+    def end_on(self, mesh: Mesh, archive: "_Archive") -> tuple["_Archive", bool]:
         """Continue the designs of a front on a finer mesh; returns them, and True if the mesh is fine enough."""
-        record = met.record.on(met.record.problem.on(mesh))
-        finer = _Met(record, met.frame())
-        searches = [Search(point, Chebyshev(met.weight(value), finer.frame)) for point, value in zip(*met.rows())]
+        record = archive.record.on(archive.record.problem.on(mesh))
+        finer = _Archive(record, archive.frame())
+        rows = zip(*archive.rows())
+        searches = [Search(point, Chebyshev(archive.weight(value), finer.frame)) for point, value in rows]
         linearizer = record.linearizer or Linearizer(record.problem, self.points)
         follow(linearizer, finer, searches, steps=_POLISH, rtol=_RTOL)
         finer.end(self.points)
@@ -243,19 +244,19 @@ def pareto(
     if len(problem.objectives) < 2:
         raise ValueError("objective must be at least two quantities; a single one is for jaxgear.minimize")
     began = time.perf_counter()
-    met = method.search(problem, Record(problem, callback))
+    archive = method.search(problem, Record(problem, callback))
     if positions is not None:
 
-        def end_on(finer: Mesh) -> tuple[_Met, bool]:
-            nonlocal met
-            met, enough = method.end_on(finer, met)
-            return met, enough
+        def end_on(finer: Mesh) -> tuple[_Archive, bool]:
+            nonlocal archive
+            archive, enough = method.end_on(finer, archive)
+            return archive, enough
 
-        met = on_finer_meshes(problem.mesh, positions, end_on)
-    record = met.record
-    record.offer(*met.compromise(), 0.0)
-    points, values = met.rows()
-    left = _evidence(record, points, values, met.frame()[1], method.points)
+        archive = on_finer_meshes(problem.mesh, positions, end_on)
+    record = archive.record
+    record.offer(*archive.compromise(), 0.0)
+    points, values = archive.rows()
+    left = _evidence(record, points, values, archive.frame()[1], method.points)
     chosen = int(np.abs(points - record.point).max(axis=1).argmin())
     low, high = np.asarray(problem.low), np.asarray(problem.high)
     parameters = low + points * (high - low)

@@ -58,7 +58,7 @@ def refined(
         steps: steps of the variables to be rounded, see `rounded`.
     """
     if positions is None:
-        _kept_to_limits(record, polish)
+        _seek_feasible(record, polish)
         return _Refined(_on_steps(record, steps, polish), float("nan"), record)
     problem = record.problem
 
@@ -67,10 +67,10 @@ def refined(
         found = record.on(problem.on(mesh))
         polish(found.problem, found, record.point)
         found.check()
-        _kept_to_limits(found, polish)
+        _seek_feasible(found, polish)
         record, ends = found, _on_steps(found, steps, polish)
         values, violations = at_more_positions(ends, ends.point[None])
-        change = problem.objectives[0].sign * (float(values[0, 0] - ends.value) + _left_by_slices(ends))
+        change = problem.objectives[0].sign * (float(values[0, 0] - ends.value) + _slice_error(ends))
         found.evaluations = ends.evaluations
         now = np.asarray([[ends.value]]), np.asarray([ends.violation])
         return _Refined(ends, change, found), fine_enough(*now, values, violations)
@@ -143,7 +143,7 @@ def at_more_positions(record: Record, points: np.ndarray) -> tuple[np.ndarray, n
     return np.asarray(values), np.asarray([four.violation for _, four in models])
 
 
-def _left_by_slices(record: Record) -> float:
+def _slice_error(record: Record) -> float:
     """Estimated change of the objective of the best design for infinitely many slices; zero for spur gears."""
     fewer, linearizer = fewer_slices(record.problem.mesh), record.linearizer
     if fewer is None:
@@ -156,7 +156,7 @@ def _left_by_slices(record: Record) -> float:
     return float(slices_left(record.value, LinearModel(posed, record.point, found).value))
 
 
-def _kept_to_limits(record: Record, polish: Polish) -> None:
+def _seek_feasible(record: Record, polish: Polish) -> None:
     """Seek a design that keeps the limits if none does so far, by their violation alone, and polish it."""
     if not counted(record.violation):
         return

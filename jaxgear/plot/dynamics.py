@@ -272,7 +272,7 @@ def phase_portrait(
     force: ArrayLike,
     ax: Axes | None = None,
     *,
-    once: tuple[ArrayLike, ArrayLike] | None = None,
+    section: tuple[ArrayLike, ArrayLike] | None = None,
     title: str = "",
 ) -> Axes:
     """Phase portrait: an orbit in the plane of DTE and velocity, coloured by drive contact, no contact, coast contact.
@@ -281,7 +281,7 @@ def phase_portrait(
         dte: DTE of the flanks at equal steps of one period [um], shape (steps,).
         velocity: velocity of the DTE [um/s], shape (steps,).
         force: mesh force [N], shape (steps,): positive on the drive flanks, negative on the coast flanks.
-        once: DTE [um] and velocity [um/s] once per mesh cycle, each of shape (points,); None for no marks.
+        section: DTE [um] and velocity [um/s] once per mesh cycle, each of shape (points,); None for no marks.
         ax: Axes to draw into; None for a new figure.
         title: title above the Axes and the legend.
     """
@@ -293,10 +293,10 @@ def phase_portrait(
         for name, there in states.items():
             if there.any():
                 ax.add_collection(LineCollection(segments[there], colors=_STATES[name], linewidths=1.4, label=name))
-        if once is not None:
+        if section is not None:
             ax.plot(
-                np.asarray(once[0]),
-                1e-3 * np.asarray(once[1]),
+                np.asarray(section[0]),
+                1e-3 * np.asarray(section[1]),
                 "o",
                 color="#D55E00",
                 markersize=4,

@@ -6,7 +6,7 @@ from ..conditions import LoadSpectrum
 from ..contact import MeshCycle, OperatingPoint
 from ..io.design_file import DesignFile
 from ..io.errors import DesignFileError, refused
-from ..io.table_keys import entry, nested, part_of, section_of
+from ..io.table_keys import entry, nested, section_of, template_of
 from ..io.tables import FurtherTable
 from ..io.value_types import WEIGHTS, list_of, positive
 from ..metrics import Analysis, Finding, Quantity
@@ -88,7 +88,7 @@ class RatingSection(FurtherTable, section_of(Rating, (*_GEARS, "lubricant", "loa
         if "lubricant" not in design.tables:
             raise DesignFileError("rating", "Z_L needs the table [lubricant]")
         further = {**gears, "lubricant": design.tables["lubricant"], "loads": self._loads(design)}
-        made: Rating = part_of(self, Rating, without=_GEARS).having(**further).build({})
+        made: Rating = template_of(self, Rating, without=_GEARS).having(**further).build({})
         self._made = design, made
         return made
 
@@ -114,7 +114,7 @@ class RatingSection(FurtherTable, section_of(Rating, (*_GEARS, "lubricant", "loa
             if getattr(section, each) is None:
                 raise DesignFileError(f"{key}.{each}", f"missing, K_v needs it; or give {name}.quality_class")
         given = {} if quality is None or section.quality_class is not None else {"quality_class": quality}
-        made: GearRating = part_of(section, GearRating).having(**given).build({})
+        made: GearRating = template_of(section, GearRating).having(**given).build({})
         return made
 
     def _loads(self, design: DesignFile) -> LoadSpectrum | None:

@@ -49,7 +49,7 @@ def convert(
         torque = found.torque if torque is None else torque
         if torque is None:
             raise DesignFileError("", "names no torque of the pinion, give it with --torque", source)
-        with interrupt.held(f"{target} is there"):
+        with interrupt.delayed(f"{target} is there"):
             write_design(
                 target,
                 found.pair,
@@ -111,7 +111,7 @@ def _to_rexs(source: Path, target: Path) -> None:
         problem = f"convert needs numbers, these are free: {', '.join(free)}; give each a value"
         raise DesignFileError("variables", problem, source)
     pinion, wheel = design.design(design.values)
-    with interrupt.held(f"{target} is there"):
+    with interrupt.delayed(f"{target} is there"):
         write_rexs(
             target,
             design.pair(),

@@ -290,13 +290,13 @@ def _flank(model: Model, gear: Component, wanted: str | None) -> Component:
             raise flanks[0].refuse(name, f"differs from that of flank {flanks[1].id}: teeth must be symmetric")
     if wanted is not None:
         return found[wanted]
-    if len(flanks) > 1 and _said(model, flanks[0]) != _said(model, flanks[1]):
+    if len(flanks) > 1 and _modification_texts(model, flanks[0]) != _modification_texts(model, flanks[1]):
         problem = f"has other modifications than flank {flanks[1].id}, choose left or right (flank)"
         raise flanks[0].refuse("", problem)
     return flanks[0]
 
 
-def _said(model: Model, flank: Component) -> list[str]:
+def _modification_texts(model: Model, flank: Component) -> list[str]:
     """Sorted texts of all modifications of a flank, to compare two flanks."""
     parts = model.related("reference", "origin", flank.id, "referenced")
     return sorted(f"{part.type} {sorted(part.attributes.items())}" for part in parts)
@@ -374,12 +374,12 @@ def _load(model: Model, stage: Component, pinion: Component, wanted: int | None)
     case = {} if none else model.cases[_chosen("load_case", "load_case", [*model.cases], wanted)]
     data = [part.id for part in _data(model, stage, pinion)]
     shafts = [part.id for part in model.related("assembly", "part", pinion.id, "assembly") if part.type == "shaft"]
-    torque = _said_of(model, case, data, "torque", "N m")
-    speed = _said_of(model, case, [pinion.id, *shafts], "rotational_speed", "1 / min")
+    torque = _number_of_case(model, case, data, "torque", "N m")
+    speed = _number_of_case(model, case, [pinion.id, *shafts], "rotational_speed", "1 / min")
     return torque, speed
 
 
-def _said_of(model: Model, case: dict[int, Component], ids: list[int], name: str, unit: str) -> float | None:
+def _number_of_case(model: Model, case: dict[int, Component], ids: list[int], name: str, unit: str) -> float | None:
     """Absolute value of a number of the first component that has it, in the load case or else outside of it."""
     for number in ids:
         for part in (case.get(number), model.component(number)):

@@ -35,7 +35,6 @@ from .reactions import BearingReactions as BearingReactions
 from .reactions import ElasticLine as ElasticLine
 from .reactions import bearing_reactions as bearing_reactions
 from .reactions import elastic_line as elastic_line
-from .reactions import with_and_without_housing as with_and_without_housing
 from .shaft import Coupling as Coupling
 from .shaft import MountedGear as MountedGear
 from .shaft import Section as Section

@@ -44,7 +44,7 @@ class System(NamedTuple):
         moving: displacements R per rigid-body displacement of the shafts, all shafts side by side.
         bearings: stiffness K of the bearings [N/um, N/mrad, N mm/mrad].
         housing: compliance C of the housing [um/N, mrad/N, mrad/(N mm)].
-        loose: 1 for rigid-body displacements that no bearing resists, which stay zero; else 0.
+        unsupported: 1 for rigid-body displacements that no bearing resists, which stay zero; else 0.
         play: force f_0 of the bearings at zero displacement, extrapolated by their tangent K, which does not pass
             through the origin with clearance [N, N mm]; zero for linear bearings.
     """
@@ -53,7 +53,7 @@ class System(NamedTuple):
     moving: Float[Array, "n movements"]
     bearings: Float[Array, "b b"]
     housing: Float[Array, "b b"]
-    loose: Float[Array, " movements"]
+    unsupported: Float[Array, " movements"]
     play: Float[Array, " b"]
 
 
@@ -85,7 +85,7 @@ def system(gearbox: Gearbox, patterns: list[Patterns]) -> System:
     size = _WAYS * count + patterns[0].vectors.shape[-1]
     held = [bearing.matrix for shaft in shafts for bearing in shaft.bearings]
     total = jnp.zeros((size, size))
-    moving, loose, first = [], [], 0
+    moving, unsupported, first = [], [], 0
     for shaft, pattern in zip(shafts, patterns):
         own = len(shaft.bearings)
         at = jnp.concatenate([jnp.stack([bearing.position for bearing in shaft.bearings]), pattern.at])
@@ -96,14 +96,14 @@ def system(gearbox: Gearbox, patterns: list[Patterns]) -> System:
         total = total + flat.T @ flexibility(shaft.beam, at).reshape(len(flat), -1) @ flat
         moving.append(flat.T @ rigid(at).reshape(-1, _WAYS))
         axial = sum(matrix[2, 2] for matrix in held[first : first + own])
-        loose.append(jnp.zeros(_WAYS).at[2].set(jnp.where(axial > 0, 0.0, 1.0)))
+        unsupported.append(jnp.zeros(_WAYS).at[2].set(jnp.where(axial > 0, 0.0, 1.0)))
         first += own
     stiffness = jnp.zeros((count, _WAYS, count, _WAYS))
     for index, matrix in enumerate(held):
         stiffness = stiffness.at[index, :, index].set(matrix)
     stiffness = stiffness.reshape(_WAYS * count, -1)
     housing = jnp.zeros_like(stiffness) if gearbox.housing is None else gearbox.housing.at(gearbox.bearing_names)
-    movements = jnp.concatenate(moving, axis=1), jnp.concatenate(loose)
+    movements = jnp.concatenate(moving, axis=1), jnp.concatenate(unsupported)
     return System(total, movements[0], stiffness, housing, movements[1], jnp.zeros(len(stiffness)))
 
 
@@ -124,7 +124,7 @@ def solve(of: System, loads: Float[Array, "patterns loads"], *, actual: bool = F
         jnp.concatenate([jnp.eye(count) + of.bearings @ (inner + of.housing), of.bearings @ here], axis=1)
         / size[:, None]
     )
-    lower = jnp.concatenate([here.T, jnp.diag(of.loose)], axis=1)
+    lower = jnp.concatenate([here.T, jnp.diag(of.unsupported)], axis=1)
     given = of.play[:, None] * float(actual) - of.bearings @ across
     right = jnp.concatenate([given / size[:, None], -there.T @ loads])
     found = solve_dense(jnp.concatenate([upper, lower]), right)
@@ -152,14 +152,14 @@ class Acting(NamedTuple):
         shafts: indices of the shafts of pinion and wheel.
         positions: positions of the middle of the common face on both shafts [mm].
         base_radii: base radii of pinion and wheel [mm].
-        ways: force on pinion and wheel in x, y, z, rx, ry per force along the line of action [N/N, N mm/N].
+        unit_forces: force on pinion and wheel in x, y, z, rx, ry per force along the line of action [N/N, N mm/N].
         half: half the common face width [mm].
     """
 
     shafts: tuple[int, int]
     positions: tuple[Scalar, Scalar]
     base_radii: tuple[Scalar, Scalar]
-    ways: tuple[Float[Array, "5"], Float[Array, "5"]]
+    unit_forces: tuple[Float[Array, "5"], Float[Array, "5"]]
     half: Scalar
 
 
@@ -196,7 +196,7 @@ def mesh_patterns(gearbox: Gearbox, mesh: int, y: Slices) -> list[Patterns]:
     for index in range(len(gearbox.shafts)):
         if index in where.shafts:
             side = where.shafts.index(index)
-            each = jnp.eye(len(y))[:, None, :] * where.ways[side][None, :, None]
+            each = jnp.eye(len(y))[:, None, :] * where.unit_forces[side][None, :, None]
             found.append(Patterns(where.positions[side] + y, each))
         else:
             found.append(Patterns(jnp.zeros(0), jnp.zeros((0, 5, len(y)))))
@@ -216,7 +216,7 @@ def load_pattern(gearbox: Gearbox, without: int | None = None) -> list[Patterns]
         force = 1e3 * torques[mesh] / where.base_radii[0]
         for side in range(2):
             at[where.shafts[side]].extend(where.positions[side] + where.half * (2 * points - 1))
-            vectors[where.shafts[side]].extend(force * weights[:, None] * where.ways[side][None])
+            vectors[where.shafts[side]].extend(force * weights[:, None] * where.unit_forces[side][None])
     for index, shaft in enumerate(gearbox.shafts):
         at[index].extend(load.position for load in shaft.loads)
         vectors[index].extend(load.vector for load in shaft.loads)

@@ -216,13 +216,13 @@ def _twist_between(
 ) -> Float[Array, "slices points"]:
     """Twist at face coordinates under unit torques at positions, from the end of the face [mrad per N mm]."""
     where = acting(gearbox, mesh)
-    held, middle = gearbox.shafts[where.shafts[side]].beam, where.positions[side]
+    beam, middle = gearbox.shafts[where.shafts[side]].beam, where.positions[side]
     others, torque = torques_on(gearbox, where.shafts[side], without=mesh)
     beyond = [jnp.abs(jnp.sum(jnp.where(flag, torque, 0.0))) for flag in (others < middle, others > middle)]
     left, right = middle - where.half, middle + where.half
     here, there = (middle + y)[:, None], at[None, :]
-    from_left = twist(held, jnp.maximum(jnp.minimum(here, there), left)) - twist(held, left)
-    from_right = twist(held, right) - twist(held, jnp.minimum(jnp.maximum(here, there), right))
+    from_left = twist(beam, jnp.maximum(jnp.minimum(here, there), left)) - twist(beam, left)
+    from_right = twist(beam, right) - twist(beam, jnp.minimum(jnp.maximum(here, there), right))
     return jnp.where(beyond[1] > beyond[0], from_right, from_left)
 
 

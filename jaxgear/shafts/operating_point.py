@@ -78,7 +78,7 @@ def _state(of: System, clearance: Float[Array, " bearings"]) -> Float[Array, " b
         force = load * x[:count]
         resisted = _force(of.bearings, clearance, displaced(x))
         stiff = 1 + jnp.abs(of.bearings) @ jnp.max(jnp.abs(inner), axis=1)
-        balance = (here.T @ force + there) / (load * arm) + of.loose * x[count:]
+        balance = (here.T @ force + there) / (load * arm) + of.unsupported * x[count:]
         return jnp.concatenate([(force + resisted) / (load * stiff), balance])
 
     start = jnp.concatenate([linear.force[:, 0] / load, first / length])

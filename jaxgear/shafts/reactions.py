@@ -1,7 +1,5 @@
 """Bearing reactions and elastic lines of shafts under the loads of a gearbox."""
 
-from dataclasses import replace
-
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
@@ -62,17 +60,6 @@ class ElasticLine(Checked):
 def bearing_reactions(gearbox: Gearbox) -> BearingReactions:
     """Bearing reactions under all loads, with mesh forces even over their faces; NaN for an unsupported shaft."""
     return _reactions(gearbox)
-
-
-def with_and_without_housing(gearbox: Gearbox) -> tuple[BearingReactions, BearingReactions]:
-    """Bearing reactions in the housing and on rigid seats, for a comparison.
-
-    Raises:
-        ValueError: for a gearbox without a housing.
-    """
-    if gearbox.housing is None:
-        raise ValueError("gearbox has no housing")
-    return _reactions(gearbox), _reactions(replace(gearbox, housing=None))
 
 
 def elastic_line(gearbox: Gearbox, shaft: str, position: Numbers) -> ElasticLine:

@@ -216,7 +216,7 @@ class ShaftFacts(NamedTuple):
         body: body diameter of every gear, 0 where it has none [mm].
         tip: tip diameter of every gear [mm].
         overlap: True if the faces of two gears have more than an end in common.
-        held: True if the bearings resist every rigid-body displacement in x, y, rx, ry.
+        supported: True if the bearings resist every rigid-body displacement in x, y, rx, ry.
         axial: True if the bearings resist axial displacement, or if neither loads nor helical gears act axially.
     """
 
@@ -230,7 +230,7 @@ class ShaftFacts(NamedTuple):
     body: OfGears
     tip: OfGears
     overlap: Bool[Array, "gears gears"]
-    held: Bool[Array, ""]
+    supported: Bool[Array, ""]
     axial: Bool[Array, ""]
 
 
@@ -252,7 +252,7 @@ def facts_of(shaft: Shaft) -> ShaftFacts:
     common = jnp.minimum(last[:, None], last[None]) - jnp.maximum(first[:, None], first[None])
     angles = [mounted.gear.helix_angle for mounted in shaft.gears if mounted.gear.helix_angle is not None]
     pushed = jnp.max(jnp.abs(jnp.stack([jnp.zeros(()), *(load.force[2] for load in shaft.loads), *angles])))
-    held = _held(shaft)
+    stiffness = _bearing_stiffness(shaft)
     bending = np.array([0, 1, 3, 4])
     return ShaftFacts(
         length=length,
@@ -265,12 +265,12 @@ def facts_of(shaft: Shaft) -> ShaftFacts:
         body=jnp.stack(bodies) if bodies else jnp.zeros(0),
         tip=jnp.stack(tips) if tips else jnp.zeros(0),
         overlap=jnp.triu(common > slack, 1),
-        held=_resists(held[bending[:, None], bending]),
-        axial=(held[2, 2] > 0) | (pushed == 0),
+        supported=_resists(stiffness[bending[:, None], bending]),
+        axial=(stiffness[2, 2] > 0) | (pushed == 0),
     )
 
 
-def _held(shaft: Shaft) -> Float[Array, "5 5"]:
+def _bearing_stiffness(shaft: Shaft) -> Float[Array, "5 5"]:
     """Stiffness of all bearings against rigid-body displacements, rotations as displacements at the shaft ends."""
     scale = jnp.stack([1.0, 1.0, 1.0, 1 / shaft.length, 1 / shaft.length])
     places = rigid(jnp.stack([item.position for item in shaft.bearings]))
@@ -287,7 +287,7 @@ def _holds(facts: ShaftFacts) -> Bool[Array, ""]:
     """True if all checks of the facts pass."""
     fits = jnp.maximum(facts.thickest, facts.body) < facts.tip
     several = jnp.all(facts.inside) & jnp.all(facts.hollow) & jnp.all(fits) & ~jnp.any(facts.overlap)
-    return several & facts.held & facts.axial
+    return several & facts.supported & facts.axial
 
 
 def _check(shaft: Shaft) -> None:
@@ -327,7 +327,7 @@ def _faults(shaft: Shaft, facts: ShaftFacts) -> Iterator[tuple[str, str]]:
     for pair in np.argwhere(facts.overlap):
         places = [f'"{shaft.gears[index].name}" at {faces[index]}' for index in pair]
         yield "gears", f"gears {' and '.join(places)} must not overlap"
-    if not facts.held:
+    if not facts.supported:
         names = ", ".join(f'"{item.name}"' for item in shaft.bearings)
         problem = "needs two that are radially stiff and apart, or one that is stiff against tilting too"
         yield "bearings", f"bearings {names} do not hold it: it {problem}"

@@ -119,26 +119,26 @@ def beam(edges: Float[Array, " edges"], diameter: Pieces, bore: Pieces, material
     )
 
 
-def flexibility(held: SteppedBeam, at: Points) -> Float[Array, "points 5 points 5"]:
+def flexibility(beam: SteppedBeam, at: Points) -> Float[Array, "points 5 points 5"]:
     """Displacements at all points under unit loads at all points, for the beam clamped at its left end.
 
     Args:
-        held: the clamped beam.
+        beam: the clamped beam.
         at: positions on the beam [mm], shape (points,).
 
     Returns:
         displacements x, y, z and rotations rx, ry per force and moment in the same directions [um/N, mrad/N,
         mrad/(N mm)], shape (points, 5, points, 5).
     """
-    held = jax.tree.map(lambda leaf: leaf[None, None], held)
+    beam = jax.tree.map(lambda leaf: leaf[None, None], beam)
     s, t = at[:, None, None], at[None, :, None]
-    stop = jnp.clip(jnp.minimum(s, t), held.start, held.end)
-    length, middle = stop - held.start, 0.5 * (stop + held.start)
+    stop = jnp.clip(jnp.minimum(s, t), beam.start, beam.end)
+    length, middle = stop - beam.start, 0.5 * (stop + beam.start)
     # moments over the common part are (s - z) and (t - z)
-    both = jnp.sum(length * (held.bending * ((s - middle) * (t - middle) + length**2 / 12) + held.shear), axis=-1)
-    first = jnp.sum(length * held.bending * (s - middle), axis=-1)
-    angle = jnp.sum(length * held.bending, axis=-1)
-    stretch = jnp.sum(length * held.tension, axis=-1)
+    both = jnp.sum(length * (beam.bending * ((s - middle) * (t - middle) + length**2 / 12) + beam.shear), axis=-1)
+    first = jnp.sum(length * beam.bending * (s - middle), axis=-1)
+    angle = jnp.sum(length * beam.bending, axis=-1)
+    stretch = jnp.sum(length * beam.tension, axis=-1)
     zero = jnp.zeros_like(both)
     rows = (
         (both, zero, zero, zero, first),
@@ -163,8 +163,8 @@ def rigid(at: Points) -> Float[Array, "points 5 5"]:
     return jnp.moveaxis(jnp.stack([jnp.stack(row) for row in rows]), 2, 0)
 
 
-def twist(held: SteppedBeam, at: Float[Array, "..."]) -> Float[Array, "..."]:
+def twist(beam: SteppedBeam, at: Float[Array, "..."]) -> Float[Array, "..."]:
     """Twist between the left end and points under a unit torque [mrad per N mm]."""
-    held = jax.tree.map(lambda leaf: jnp.expand_dims(leaf, tuple(range(at.ndim))), held)
-    length = jnp.clip(at[..., None], held.start, held.end) - held.start
-    return jnp.sum(length * held.torsion, axis=-1)
+    beam = jax.tree.map(lambda leaf: jnp.expand_dims(leaf, tuple(range(at.ndim))), beam)
+    length = jnp.clip(at[..., None], beam.start, beam.end) - beam.start
+    return jnp.sum(length * beam.torsion, axis=-1)

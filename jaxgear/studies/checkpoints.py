@@ -111,7 +111,7 @@ class Checkpoints:
             there = self.folder.iterdir() if self.folder.is_dir() else ()
             return sum(not path.name.startswith(".") for path in there)
 
-    def told(self, done: int, total: int | None) -> None:
+    def report(self, done: int, total: int | None) -> None:
         """Call the callback with the number of results so far and the total."""
         self._used = True
         if self._callback is not None and self.folder is not None:
@@ -147,7 +147,7 @@ class CheckpointsOfKind(Generic[R]):
             if path is not None:
                 self._write(path, found)
         self._done += 1
-        self._checkpoints.told(self._done, self._total)
+        self._checkpoints.report(self._done, self._total)
         return found
 
     def _write(self, path: Path, found: R) -> None:

@@ -111,7 +111,7 @@ def sought(
         optimum = found()
         return optimum.mesh, (optimum.pinion, optimum.wheel)
     lowest = design.design({name: low for name, (low, _) in design.bounds.items()})  # with contents of data files
-    asked = name, quick, design.says, design.tables.get("lubricant"), design.tables.get("strength")
+    asked = name, quick, design.text, design.tables.get("lubricant"), design.tables.get("strength")
     kept = checkpoints.of(NamedArrays())((mesh, lowest, asked), lambda: _numbers(found()))
     numbers = {name: float(value) for name, value in kept.items()}
     sizes = dataclasses.replace(mesh.resolution, positions=int(numbers[_POSITIONS]), pairs=int(numbers[_PAIRS]))

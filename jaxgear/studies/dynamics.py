@@ -40,7 +40,7 @@ _SAME = 1e-3  # relative difference of dynamic factors of one orbit, by two inte
 _BESIDE = 4  # number of speeds on each side of a peak that are repeated with a finer mesh force
 
 
-def branches_of(
+def _branches_of(
     oscillator: Oscillator, runs: Mapping[str, SpeedResponse], steps: tuple[int, ...], step: float = _STEP
 ) -> list[Branch]:
     """Branches of periodic orbits through the lowest speed and through the first speeds of falling runs, without
@@ -224,7 +224,7 @@ class DynamicsStudy(AbstractStudy[DynamicsResult]):
         torque = next_to_design(design, self.torques)
         runs = responses["unmodified"][torque]
         followed, step = ({UP: runs[UP]}, _QUICK_STEP) if self.quick else (runs, _STEP)
-        branches = branches_of(oscillators["unmodified"][torque], followed, steps, step)
+        branches = _branches_of(oscillators["unmodified"][torque], followed, steps, step)
         frequencies = {
             name: {torque: float(of.mesh) for torque, of in several.items()} for name, several in natural.items()
         }

@@ -360,7 +360,7 @@ class DynamicsResult(AbstractStudyResult):
         moved = motion(oscillator, frequency, start, periods=count, steps=self.steps[place])
         once = response.poincare_dte[place, :count], response.poincare_velocity[place, :count]
         title = f"{name}, {self.torque:g} N m, {frequency:.0f} Hz"
-        plot.phase_portrait(moved.dte, moved.dte_rate, moved.force, panel, once=once, title=title)
+        plot.phase_portrait(moved.dte, moved.dte_rate, moved.force, panel, section=once, title=title)
 
 
 def next_to_design(design: DesignFile, torques: Sequence[float]) -> float:

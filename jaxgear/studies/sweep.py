@@ -349,7 +349,7 @@ class SweepStudy(AbstractStudy[SweepResult]):
         if jax.process_index() > 0:  # only the first process reports
             return SweepResult(design, self.quick, self.output, size, table, table.take([]), (), (), meter.rate)
         chosen = table.best(self.best)
-        grid, findings = said_of_best(design, chosen, size) if len(chosen) else ([], [])
+        grid, findings = best_variant_lines(design, chosen, size) if len(chosen) else ([], [])
         return SweepResult(design, self.quick, self.output, size, table, chosen, grid, findings, meter.rate)
 
 
@@ -390,7 +390,7 @@ class _Meter:
         return max(self._done - self._first, 0) / spent if spent > 0 else 0.0
 
 
-def said_of_best(design: DesignFile, best: SweepTable, size: Resolution) -> tuple[list[str], list[str]]:
+def best_variant_lines(design: DesignFile, best: SweepTable, size: Resolution) -> tuple[list[str], list[str]]:
     """Lines on the best variant: changes of its values on a finer grid, and its findings.
 
     Args:

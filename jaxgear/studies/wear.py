@@ -58,7 +58,7 @@ _BEYOND = "*"  # marks lives beyond the simulated revolutions
 _OF_MOTION = " Or the flanks vibrate without an orbit, or until coast flanks touch: run jaxgear dynamics."
 
 
-class _Life(NamedTuple):
+class _HistoryNumbers(NamedTuple):
     """A wear history with numbers that several records need.
 
     Attributes:
@@ -99,9 +99,9 @@ class WearResult(AbstractStudyResult):
     histories: Mapping[str, WearHistory]
     scatters: Mapping[str, wear_scatter.Samples]
 
-    def _lives(self) -> dict[str, _Life]:
+    def _history_numbers(self) -> dict[str, _HistoryNumbers]:
         return {
-            name: _Life(
+            name: _HistoryNumbers(
                 history,
                 np.asarray(over_life(history, "ppte")),
                 np.asarray(worn_volume(history))[-1],
@@ -110,7 +110,7 @@ class WearResult(AbstractStudyResult):
             for name, history in self.histories.items()
         }
 
-    def _records(self) -> Iterator[Record[_Life]]:
+    def _records(self) -> Iterator[Record[_HistoryNumbers]]:
         """Scalar results of a wear history, in the order of the table."""
         settings = self.settings
         ended, depth, ppte = float(settings.revolutions), settings.depth_limit, settings.ppte_limit
@@ -135,16 +135,16 @@ class WearResult(AbstractStudyResult):
             yield Record("max_dynamic_factor_over_life", "", lambda of: of.factors.max(), "K_v worst")
         if depth is not None:  # which goes on behind the last block
             heading = f"revolutions\nto {float(depth):g} um\ndepth"
-            shown = partial(_life_text, ended=ended, beyond="never")
+            shown = partial(_revolutions_text, ended=ended, beyond="never")
             yield Record("life_to_depth", "revolutions", lambda of: life_to_depth(of.history, depth), heading, shown)
         if ppte is not None:  # which is not known behind it
             heading = f"revolutions\nto PPTE of\n{float(ppte):g} um"
-            shown = partial(_life_text, ended=ended, beyond=f"> {ended:.3g}")
+            shown = partial(_revolutions_text, ended=ended, beyond=f"> {ended:.3g}")
             yield Record("life_to_ppte", "revolutions", lambda of: life_to(of.history, "ppte", ppte), heading, shown)
 
     def tables(self) -> Iterator[Table]:
         """Tables of the wear histories of all designs, and of their scatter if the file has tolerances."""
-        settings, lives = self.settings, self._lives()
+        settings, lives = self.settings, self._history_numbers()
         title = f"{self.design.title}: {float(settings.revolutions):.3g} revolutions at {self._loads()}"
         table = table_of(list(self._records()), lives, title, "design")
         if any(_BEYOND in cell for row in table.rows for cell in row[1:]):
@@ -239,7 +239,7 @@ class WearResult(AbstractStudyResult):
                 **flanks_data(*self.designs[name]),
                 **(wear_scatter.summary(self.scatters[name]) if name in self.scatters else {}),
             }
-            for name, life in self._lives().items()
+            for name, life in self._history_numbers().items()
         }
         return {**({"optimum_over_life": self._sought()} if OVER_LIFE in self.designs else {}), "designs": designs}
 
@@ -281,11 +281,11 @@ class WearResult(AbstractStudyResult):
         yield from wear_scatter.figures(self.scatters)
 
 
-def _pressure(name: str, settings: Wear, life: _Life) -> Any:
+def _pressure(name: str, settings: Wear, life: _HistoryNumbers) -> Any:
     return number_of(name, life.history, settings)
 
 
-def _life_text(value: float, ended: float, beyond: str) -> str:
+def _revolutions_text(value: float, ended: float, beyond: str) -> str:
     """Revolutions of a life, which was computed to `ended`; NaN where the flanks are not known."""
     return beyond if np.isposinf(value) else f"{value:.3g}" + f" {_BEYOND}" * (value > ended)
 
@@ -345,7 +345,7 @@ class WearStudy(AbstractStudy[WearResult]):
             start = first_mesh(design, highest, quick=quick)
             _, designs[OVER_LIFE] = sought(design, OVER_LIFE, self.over_life, start, checkpoints, stages, quick=quick)
         kept = checkpoints.of(Marches())
-        histories = {name: self._life(mesh, name, flanks, kept, stages) for name, flanks in designs.items()}
+        histories = {name: self._history(mesh, name, flanks, kept, stages) for name, flanks in designs.items()}
         scatters: Mapping[str, wear_scatter.Samples] = {}
         if self.gears is not None:
             stages.begin("wear of manufactured gears of all designs")
@@ -357,7 +357,7 @@ class WearStudy(AbstractStudy[WearResult]):
             )
         return WearResult(design, self.settings, designs, histories, scatters)
 
-    def _life(
+    def _history(
         self, mesh: Mesh, name: str, flanks: Modifications, kept: CheckpointsOfKind[Any], stages: Stages
     ) -> WearHistory:
         """Wear history of one design at the torque of the file."""

@@ -24,7 +24,7 @@ from .checkpoints import Checkpoints, NamedArrays
 Samples = Mapping[str, np.ndarray]
 
 _PPTE, _DEPTH = "mean_ppte_over_life", "wear_depth"
-_LIVES = {"life_to_depth": ("depth_limit", MOST_LIVES), "life_to_ppte": ("ppte_limit", 1.0)}
+_LIMITED = {"life_to_depth": ("depth_limit", MOST_LIVES), "life_to_ppte": ("ppte_limit", 1.0)}
 _LEVEL = 0.95
 _SIDE_BY_SIDE = 32  # lives
 
@@ -67,7 +67,7 @@ def manufactured_wear(
     cases = conditions(mesh, torque, manufactured).on(mesh)
     assert cases.removed is not None
     kept = Checkpoints().of(NamedArrays()) if keep is None else keep
-    names, load, removed = tuple(asked(settings)), cases.torque[0], cases.removed[0]
+    names, load, removed = tuple(scattered_names(settings)), cases.torque[0], cases.removed[0]
 
     def of(pinion: AbstractModification, wheel: AbstractModification) -> Samples:
         def make() -> Samples:
@@ -91,9 +91,13 @@ def _numbers(settings: Wear, names: tuple[str, ...], mesh: Mesh, torque, pinion,
     return jax.lax.map(of, removed, batch_size=_SIDE_BY_SIDE)
 
 
-def asked(settings: Wear) -> list[str]:
+def scattered_names(settings: Wear) -> list[str]:
     """Names of the quantities whose scatter is computed."""
-    return [_PPTE, _DEPTH, *(name for name, (limit, _) in _LIVES.items() if getattr(settings, limit) is not None)]
+    return [
+        _PPTE,
+        _DEPTH,
+        *(name for name, (limit, _) in _LIMITED.items() if getattr(settings, limit) is not None),
+    ]
 
 
 def tables(design: DesignFile, settings: Wear, scatters: Mapping[str, Samples]) -> Iterator[Table]:
@@ -108,9 +112,9 @@ def _records(settings: Wear) -> Iterator[Record[Samples]]:
         yield Record(name, "", partial(_mean, name=name), heading)
         yield Record(name, "", partial(_bound, name=name), "95 %\nbelow")
     limits = {"life_to_depth": "95 % last,\n{:g} um deep", "life_to_ppte": "95 % last,\nPPTE {:g} um"}
-    for name in asked(settings)[2:]:
-        heading = limits[name].format(float(getattr(settings, _LIVES[name][0])))
-        shown = partial(_life_text, settings, name)
+    for name in scattered_names(settings)[2:]:
+        heading = limits[name].format(float(getattr(settings, _LIMITED[name][0])))
+        shown = partial(_revolutions_text, settings, name)
         yield Record(name, "", partial(_lasts, name=name, share=_LEVEL), heading, shown)
     yield Record("failed", "", failed, "failed", "d")
 
@@ -141,7 +145,7 @@ def summary(samples: Samples) -> dict[str, Any]:
     found: dict[str, Any] = {"pairs": len(samples[_PPTE]), "failed": failed(samples)}
     for name in samples:
         values, key = samples[name], UnitKey(name, WEAR_QUANTITIES[name].unit)
-        if name in _LIVES:  # they end at the simulated revolutions: a mean would depend on these
+        if name in _LIMITED:  # they end at the simulated revolutions: a mean would depend on these
             found[key] = {"half_last": _lasts(samples, name, 0.5), "95_percent_last": _lasts(samples, name, _LEVEL)}
             continue
         found[key] = {"mean": _mean(samples, name), "std": float(np.std(values, ddof=1)), "q95": _bound(samples, name)}
@@ -183,9 +187,9 @@ def _lasts(samples: Samples, name: str, share: float) -> float:
     return found if np.isfinite(found) else np.nan
 
 
-def _life_text(settings: Wear, name: str, value: float) -> str:
+def _revolutions_text(settings: Wear, name: str, value: float) -> str:
     """Revolutions in words; a lower bound for lives beyond the simulated revolutions."""
-    most = _LIVES[name][1] * float(settings.revolutions)
+    most = _LIMITED[name][1] * float(settings.revolutions)
     return f"> {most:.3g}" if value >= most else f"{value:.3g}"
 
 

@@ -222,7 +222,7 @@ class LatinHypercube(_Sampling):
     def __init__(self, bounds: Bounds, samples: int, *, seed: int) -> None:
         super().__init__(bounds, samples, seed=seed)
         streams = np.random.SeedSequence(self.seed).spawn(len(self.names) + 1)
-        self._permutations = [Permutation(self.size, stream) for stream in streams[1:]]
+        self._permutations = [_Permutation(self.size, stream) for stream in streams[1:]]
         self._key = streams[0].generate_state(2, np.uint64)
 
     def _points(self, start, stop):
@@ -239,7 +239,7 @@ class LatinHypercube(_Sampling):
         return np.random.Generator(stream).random(skipped + (stop - start) * width)[skipped:].reshape(-1, width)
 
 
-class Permutation:
+class _Permutation:
     """A random permutation of 0 ... size - 1 that is computed, not stored; see `LatinHypercube`."""
 
     def __init__(self, size: int, seed: np.random.SeedSequence) -> None:

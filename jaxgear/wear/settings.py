@@ -168,10 +168,10 @@ def number_of(name: str, history: WearHistory, settings: Wear) -> Float[Array, "
 
 def _number(name: str, analysis: Analysis, wear: Wear) -> Float[Array, ""]:
     # all quantities of the same settings come from one life
-    return number_of(name, analysis.once(wear, "life", lambda: _life(analysis, wear)), wear)
+    return number_of(name, analysis.once(wear, "life", lambda: _history(analysis, wear)), wear)
 
 
-def _life(analysis: Analysis, wear: Wear) -> WearHistory:
+def _history(analysis: Analysis, wear: Wear) -> WearHistory:
     load = analysis.operating_point if wear.loads is None else None
     wear = replace(wear, largest_increment=None)
     return wear.history(analysis.prepared_mesh, load, **analysis.flanks, deviation=analysis.deviation)

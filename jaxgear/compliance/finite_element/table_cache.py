@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...numerics.durable import KeptFiles, user_folder
+from ...numerics.durable import FileStore, user_folder
 from .build import VERSION, GearNumbers
 from .shape import Shape
 
@@ -29,7 +29,7 @@ def cached(folder: Path | None, shape: Shape, build: Callable[[Shape], GearNumbe
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise ValueError(f"cache = {str(folder)!r}: {error.strerror}") from error
-    files = KeptFiles(folder, f"finite elements {VERSION}".encode())
+    files = FileStore(folder, f"finite elements {VERSION}".encode())
     made_of = json.dumps(shape.numbers).encode()
     content = files.read(made_of)
     if content is not None:
