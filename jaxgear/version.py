@@ -2,7 +2,7 @@
 
 
 def version() -> str:
-    """As text, of code that runs uninstalled too."""
+    """Version of the package as text, also of code that is not installed."""
     from importlib import metadata
 
     try:

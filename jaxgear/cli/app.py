@@ -26,7 +26,7 @@ OK, NOT_CONVERGED, FAILED, INTERRUPTED = 0, 1, 2, 130
 
 
 class _Commands(TyperGroup):
-    """The commands, with those and the studies that entry points name, which are looked for where a name is unknown."""
+    """All commands: built-in ones, and the studies of entry points, which are searched if a name is unknown."""
 
     def list_commands(self, ctx: Any) -> list[str]:
         """Names for the help."""
@@ -100,7 +100,7 @@ def new(
         tuple[float, float], typer.Option(metavar="X1 X2", help="Profile shifts of pinion and wheel in modules.")
     ] = (0.0, 0.0),
 ) -> int:
-    """Write a commented design file for a pair, which analyze and optimize take as it is.
+    """Write a commented design file for a pair, ready for `analyze` and `optimize`.
 
     A file that is there is never replaced.
     """
@@ -112,13 +112,13 @@ def new(
 
 
 def _look_at(file: Path) -> None:
-    """Reports a misspelt key before JAX is imported, which takes seconds."""
+    """Report a misspelt key before the import of JAX, which takes seconds."""
     if "jax" not in sys.modules:
         check_keys(file)
 
 
 def command_of(place: str, name: str, own: Callable[..., Mapping[str, Any]]) -> Callable[..., int]:
-    """The command of a study: its own arguments and options among those of all studies.
+    """Command of a study, with its own arguments and options among those of all studies.
 
     Args:
         place: place of its class, as `module:class`.

@@ -146,7 +146,7 @@ def _without_none(data: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _listed(title: str, data: Mapping[str, Any]) -> list[Table]:
-    """Nested data as a table; those of several alike side by side."""
+    """Nested data as a table, with similar entries side by side."""
     if len(data) > 1 and all(isinstance(value, Mapping) for value in data.values()):
         columns = [dict(numbers(value)) for value in data.values()]
         names = dict.fromkeys(name for column in columns for name in column)
@@ -157,7 +157,7 @@ def _listed(title: str, data: Mapping[str, Any]) -> list[Table]:
 
 
 def _split(title: str, data: Mapping[str, Any]) -> list[Table]:
-    """Several tables of as many columns as a page holds."""
+    """Split a table into several that fit the width of a page."""
     names = list(data)
     parts = (names[first : first + _SIDE_BY_SIDE] for first in range(0, len(names), _SIDE_BY_SIDE))
     return [table for part in parts for table in _listed(title, {name: data[name] for name in part})]

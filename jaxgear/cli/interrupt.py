@@ -34,7 +34,7 @@ state = State()
 
 @contextmanager
 def listening() -> Iterator[None]:
-    """Takes care of both signals for a block; nothing changes outside the main thread."""
+    """Handle both signals during a block; changes nothing outside the main thread."""
     state.requested, state.delayed, state.written, state.before = False, False, NOTHING, None
     if threading.current_thread() is not threading.main_thread():
         yield
@@ -50,7 +50,7 @@ def listening() -> Iterator[None]:
 
 @contextmanager
 def importing() -> Iterator[None]:
-    """Lets both signals do in a block what they did before: an exception could be lost in a module that starts."""
+    """Restore the earlier handling of both signals during a block: an exception could be lost in a module import."""
     if state.before is None:
         yield
         return
@@ -63,7 +63,7 @@ def importing() -> Iterator[None]:
 
 
 def note(written: str) -> None:
-    """Says what is on the disk from now on."""
+    """Set the text on the files on the disk for the message of an interruption."""
     state.written = written
     check()
 
@@ -76,7 +76,7 @@ def check() -> None:
 
 @contextmanager
 def delayed(then: str) -> Iterator[None]:
-    """Lets both signals wait for the end of a block that must not be left half done; `then` is what is on the disk."""
+    """Delay both signals to the end of a block that must not be left half done; `then` describes the files after it."""
     check()
     state.delayed = True
     try:

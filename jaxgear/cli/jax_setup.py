@@ -15,7 +15,7 @@ _DEVICES_FLAG = "xla_force_host_platform_device_count"
 
 
 def use_all_cores() -> None:
-    """Makes every usable core a device of JAX, unless the user has said how many devices there are.
+    """Make every usable core a device of JAX, unless the user has set the number of devices.
 
     One device leaves most cores idle: the arrays of a contact solution are too small to be split among them. Two are
     the least, because a program for several devices rounds differently from one for a single device.
@@ -59,7 +59,7 @@ def join_processes(coordinator: str | None, processes: int | None, process: int 
 
 
 def enable_cache() -> Path | None:
-    """Keeps compiled programs in a private folder of the user's cache directory.
+    """Store compiled programs in a private folder of the user's cache directory.
 
     Returns:
         the folder, or None where there is none: it cannot be made, is not private, or JAX keeps programs itself.
@@ -74,14 +74,14 @@ def enable_cache() -> Path | None:
 
 
 class Files(FileStore):
-    """Programs as files of a folder, named by all that they depend on."""
+    """Programs as files of a folder, named by a digest of everything that they depend on."""
 
     def __init__(self, folder: Path) -> None:
         super().__init__(folder, _surroundings(), executed=True)
 
 
 def _surroundings() -> bytes:
-    """Digest of what every compiled program depends on: package code, versions, settings, backend and processor."""
+    """Digest of the inputs of all compiled programs: package code, versions, settings, backend and processor."""
     found = hashlib.sha256()
     package = Path(__file__).parent.parent
     for file in sorted(package.rglob("*.py")):

@@ -53,7 +53,7 @@ class Stages(bars.Progress, studies.Stages):
             self.console.print(f"jaxgear: {progress.stage}", soft_wrap=True)
 
     def replaces(self, target: Path) -> None:
-        """Says which earlier results a command is about to replace, as long as it can still be stopped."""
+        """Print which earlier results the command will replace, while it can still be stopped."""
         held = earlier(target)
         if held:
             line = f"jaxgear: replaces the results in {target}{os.sep} ({held}); --output keeps them"
@@ -133,7 +133,7 @@ def run_study(
 
 @contextmanager
 def _folder(study: AbstractStudy[Any], target: Path, stages: Stages) -> Iterator[Path]:
-    """Folder of the results: a new one that takes the place of the target at the end, or the one in which they grow."""
+    """Folder of the results: a new one that replaces the target at the end, or the target itself if results grow."""
     if study.grows:
         yield target
         return
@@ -177,7 +177,7 @@ def opened(file: Path, *, cache: bool) -> DesignFile:
 
 
 def default_folder(file: Path, *command: str, quick: bool = False) -> Path:
-    """Folder of the results of a command, in which those of no other command or kind of run are."""
+    """Folder for the results of one command and kind of run."""
     folder = Path("results", file.stem, *command)
     return folder.with_name(f"{folder.name}-quick") if quick else folder
 
@@ -197,12 +197,12 @@ def _checkpoints(target: Path) -> Checkpoints:
 
 
 def _import_ahead(*modules: str) -> None:
-    """Imports what is needed later in another thread: this one will wait for the compiler."""
+    """Import modules in another thread while this one waits for the compiler."""
     threading.Thread(target=lambda: [importlib.import_module(module) for module in modules]).start()
 
 
 def _without_windows() -> None:
-    """Lets matplotlib draw into files alone: the command line never shows a window."""
+    """Restrict matplotlib to files: the command line never shows a window."""
     import matplotlib
     import matplotlib.pyplot  # waits for the thread that imports it ahead
 

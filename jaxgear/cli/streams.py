@@ -11,13 +11,13 @@ from contextlib import contextmanager
 
 
 def silence_compiler() -> None:
-    """XLA writes alarms to stderr that ask for a bug report where it compiles for long; what fails, it raises."""
+    """Hide the messages of XLA on long compilations, which ask for a bug report; its errors are still raised."""
     os.environ.setdefault("TF_CPP_MIN_LOG_LEVEL", "3")  # fatal ones alone
 
 
 @contextmanager
 def warnings() -> Iterator[None]:
-    """Shows what the library warns of as lines on stderr."""
+    """Show the warnings of the library as lines on stderr."""
     lines = logging.StreamHandler()
     lines.setLevel(logging.WARNING)
     lines.setFormatter(logging.Formatter("jaxgear: warning: %(message)s"))
@@ -44,7 +44,7 @@ def one_line(error: Exception) -> str:
 
 
 def forget_output() -> None:
-    """Keeps the flush at exit quiet where standard output takes nothing."""
+    """Avoid an error message at exit if standard output is closed."""
     try:
         sys.stdout.flush()
     except OSError:

@@ -9,7 +9,7 @@ _WIDTH = 120  # of a file [characters]
 
 
 def console(*, stderr: bool = False) -> Console:
-    """A console that takes brackets literally; wide enough for the table when it writes into a file."""
+    """Console without markup; a file gets a fixed width that fits the tables."""
     made = Console(stderr=stderr, markup=False, highlight=False, emoji=False)
     if not made.is_terminal:
         made.width = _WIDTH

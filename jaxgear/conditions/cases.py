@@ -89,7 +89,7 @@ class LoadSpectrum(Checked):
     def from_hours(
         torques: Numbers, hours: Numbers, speeds: Numbers | None = None, friction: Given | None = None
     ) -> "LoadSpectrum":
-        """A duty cycle: every torque with the hours that it is run for.
+        """Duty cycle from the operating hours at every torque.
 
         Args:
             torques, speeds, friction: as for the class.

@@ -111,7 +111,7 @@ def bifurcation_at(kind: Kind, parameter: Scalar, point: Corrected, orbit: Orbit
 
 
 def critical(kind: Kind, multipliers: np.ndarray) -> complex:
-    """Critical multiplier: +1, -1, or of the complex pair nearest to the unit circle the one above the real axis."""
+    """Multiplier at the bifurcation: +1, -1, or the one with positive imaginary part nearest the unit circle."""
     if kind != "Neimark-Sacker":
         return 1.0 if kind == "fold" else -1.0
     apart = np.where(multipliers.imag > _REAL, np.abs(np.abs(multipliers) - 1), np.inf)
@@ -265,7 +265,7 @@ class _Search(NamedTuple):
 
     @property
     def enclosed(self) -> Bool[Array, ""]:
-        """True if the zero of the test function has been met or enclosed; at a corner it can only be enclosed."""
+        """True if a zero of the test function was found or enclosed; at a corner it can only be enclosed."""
         apart = jnp.abs(self.distances[1] - self.distances[0])
         return (self.trials > 1) & ((jnp.abs(self.tests[1]) < _FLAT) | (self.bracketed & (apart < _NARROW)))
 

@@ -211,5 +211,5 @@ def smallest(values: Thirds) -> Scalar:
 
 
 def share(of: History, holds: Array) -> Scalar:
-    """Share of the time in which a condition of shape (3, samples) is true; it has no derivative."""
+    """Share of time in which a condition of shape (3, samples) is true; without derivative."""
     return mean(of, holds.astype(of.dte.dtype))

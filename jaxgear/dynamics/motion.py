@@ -174,7 +174,7 @@ def _run(
     total = (samples * cycles).astype(ends.dtype)
 
     def frequency_at(position):
-        """Mesh frequency [Hz] after so many cycles."""
+        """Mesh frequency [Hz] after a number of cycles."""
         return jnp.sqrt(ends[0] ** 2 + (ends[1] ** 2 - ends[0] ** 2) * position / total)
 
     def stepped(index, moving: _Moving, done) -> _Moving:

@@ -42,7 +42,7 @@ class Run(NamedTuple):
 
 
 def with_like_kicks(runs: Mapping[str, Run]) -> dict[str, Run]:
-    """Runs with as many kicks each, those added being none."""
+    """Runs padded to the same number of kicks; padding kicks do nothing."""
     most = max(len(run.kicks) for run in runs.values())
     return {name: run._replace(kicks=(*run.kicks, *[1.0] * (most - len(run.kicks)))) for name, run in runs.items()}
 

@@ -165,7 +165,7 @@ class Identified(Checked):
 
 
 class _Problem(eqx.Module):
-    """Unknowns of a fit and the model that they enter.
+    """Unknowns of a fit and the model that depends on them.
 
     Attributes:
         names: of the unknowns.

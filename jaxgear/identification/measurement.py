@@ -98,7 +98,7 @@ class Bins(NamedTuple):
 
 
 def _bins_of(measurement: Measurement, positions: int, first: float, period: int = 1) -> Bins:
-    """Readings joined; those as many base pitches apart as the period count as one position."""
+    """Bins of the readings by torque and mesh position; positions that differ by the period are one."""
     phase, torque = np.asarray(measurement.phase, float), np.asarray(measurement.torque, float)
     torques, level = np.unique(torque, return_inverse=True)
     count = period * positions
@@ -124,7 +124,7 @@ def _noise_of(measurement: Measurement, bins: Bins) -> Scalar:
 
 
 class Data(eqx.Module):
-    """Readings joined per torque and position of the mesh: what a compiled fit takes.
+    """Readings joined per torque and mesh position, the input of the compiled fit.
 
     Attributes:
         torques: ascending.
@@ -300,7 +300,7 @@ def read_measurement(path: str | Path, pair: GearPair, *, noise: float | None = 
 
 
 def _check_shaft(headings: Collection[str], pair: GearPair) -> None:
-    """Refuses a transmission error that is an angle of neither shaft by name."""
+    """Raise if the heading of an angular transmission error names neither pinion nor wheel."""
     for heading in headings:
         quantity, unit = parts(heading or "")
         if quantity in ("te", _TE) and unit in ANGLES:
@@ -335,7 +335,7 @@ def _place(columns: Collection[str]) -> tuple[str, str]:
 
 
 def _check_units(pair: GearPair, torque: np.ndarray, error: np.ndarray, heading: str) -> None:
-    """Refuses what another unit alone explains."""
+    """Raise for torques or errors of an implausible size, which are probably in another unit."""
     pinion = pair.pinion
     most = 1e-3 * _MOST_STRESS * float(pair.face_width * pinion.module * pinion.pitch_radius)
     if np.max(torque) > most:

@@ -46,7 +46,7 @@ _PANEL = 45.0  # height [mm]
 
 
 class _Flanks(eqx.Module):
-    """The design of the file from its variables, whatever else is unknown."""
+    """Design of the file as a function of all unknowns, of which it uses its variables."""
 
     design: FileDesign
 
@@ -238,7 +238,7 @@ class IdentificationResult(AbstractStudyResult):
     found: Identified
 
     def _flanks(self) -> tuple[AbstractModification, AbstractModification]:
-        """Both modifications; raises ValueError where the estimates make none, such as a negative relief."""
+        """Both modifications; raises ValueError if the estimates are invalid, such as a negative relief."""
         return _Flanks(self.design.design)(self.found.parameters)
 
     def _rows(self) -> dict[str, tuple[str, float, float, float, float]]:
@@ -324,7 +324,7 @@ class IdentificationResult(AbstractStudyResult):
         }
 
     def details(self) -> Iterator[str]:
-        """Reasons why the pair is not written in a format that has no place for it."""
+        """Reasons why the pair cannot be written in a format."""
         if not list(self.failures()):
             with tempfile.TemporaryDirectory() as folder:
                 yield from self._exchanged(Path(folder))
@@ -339,7 +339,7 @@ class IdentificationResult(AbstractStudyResult):
                 yield f"{path.name} is not written: {str(error).removeprefix(f'{write.__name__}: ')}"
 
     def _pair(self) -> dict[str, Any]:
-        """The pair with the estimates, as both writers take it."""
+        """Pair with the estimates, for both writers."""
         design, (pinion, wheel) = self.design, self._flanks()
         case = {name: getattr(design, name) for name in ("torque", "speed", "quality_classes", "title")}
         return {"pair": design.pair(), "pinion": pinion, "wheel": wheel, **case}

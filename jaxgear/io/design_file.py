@@ -101,7 +101,7 @@ class FileSection(FileTable):
 
 
 def file_section(further: Mapping[str, type[FurtherTable]]) -> type[FileSection]:
-    """The keys of a whole file with further tables."""
+    """Keys of a whole file, including further tables."""
     texts = {name: summary(cls) for name, cls in further.items()}
     keys = {name: replace(table(), meaning=text[:1].lower() + text[1:]) for name, text in texts.items()}
     return type("FileSection", (FileSection,), {**keys, "__doc__": FileSection.__doc__})
@@ -175,7 +175,7 @@ class _FileMesh(eqx.Module):
 
 @dataclass(frozen=True)
 class DesignFile:
-    """A design file, checked: what it says is physically possible.
+    """A checked design file, which is physically possible.
 
     Attributes:
         path: the file.
@@ -221,7 +221,7 @@ class DesignFile:
     _longest: GearPair
 
     def needed(self, name: str, why: str) -> Any:
-        """A further table, of which a command says why it needs it.
+        """Further table that a command needs.
 
         Raises:
             DesignFileError: where the file does not have it.
@@ -231,7 +231,7 @@ class DesignFile:
         return self.tables[name]
 
     def spectrum(self, section: Any) -> LoadSpectrum:
-        """The load spectrum of a table with torques, weights and, where it knows them, speeds.
+        """Load spectrum of a table with torques, weights and, optionally, speeds.
 
         Without torques it is the design torque, without speeds it runs at that of the file.
 
@@ -268,7 +268,7 @@ class DesignFile:
 
     @property
     def _meshing(self) -> GearPair:
-        """The pair as the flanks that carry the torque see it."""
+        """Pair with the flanks that carry the torque as its drive flanks."""
         return self._middle.pair.coast if self.coast else self._middle.pair
 
     @property
@@ -278,7 +278,7 @@ class DesignFile:
 
     @property
     def load_in_words(self) -> str:
-        """The design torque, with the flanks that carry it where they are the coast flanks."""
+        """Design torque in words, with a note for coast flanks."""
         return f"{self.signed_torque:g} N m{', coast flanks,' * self.coast}"
 
     def check_drive(self, owner: str) -> None:
@@ -288,7 +288,7 @@ class DesignFile:
             raise DesignFileError("load.torque", problem, self.path)
 
     def resolution(self, torque: float | None = None) -> Resolution:
-        """The array sizes that the file asks for, with as few tooth pairs as the load needs where it names none.
+        """Array sizes of the file, with as few tooth pairs as the load needs if the file gives no number.
 
         Args:
             torque: largest torque on the pinion [N m], None for the largest that [load] names; those that wear the
@@ -326,7 +326,7 @@ class DesignFile:
 
     @property
     def takes_more_pairs(self) -> bool:
-        """Whether the file leaves the number of tooth pairs open."""
+        """True if the file leaves the number of tooth pairs open."""
         return self._mesh.resolution.pairs is None
 
     @property
@@ -364,11 +364,11 @@ class DesignFile:
             return refused("resolution", prepare, self._meshing, **options)
 
     def begin_contact(self, first: Resolution, resolution: Resolution) -> None:
-        """Starts to compile what prepares and solves the mesh, see `contact.begin_contact`."""
+        """Start to compile the programs that prepare and solve the mesh, see `contact.begin_contact`."""
         begin_contact(self._meshing, self._middle.compliance, first, resolution, self._support(first))
 
     def sweep_mesh(self, resolution: Resolution) -> Mesh | Callable[[Mapping[str, Any]], Mesh]:
-        """The prepared mesh; a function of the parameters that prepares it where numbers of the gears are free."""
+        """Prepared mesh; if numbers of the gears are variables, a function of the parameters that prepares it."""
         return replace(self._mesh, resolution=resolution) if self._mesh.free() else self.mesh(resolution)
 
     def operating_point(self, parameters: Mapping[str, Any]) -> OperatingPoint:

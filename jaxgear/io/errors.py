@@ -24,19 +24,19 @@ class DesignFileError(ValueError):
 
 
 def printable(text: str) -> str:
-    """A text with escape sequences in place of the characters that a terminal would obey instead of showing them."""
+    """Text with escape sequences in place of control characters."""
     return _OBEYED.sub(lambda found: found[0].encode("unicode_escape").decode(), text)
 
 
 def obeyed(text: str) -> str:
-    """The first character of a text that a terminal would obey, as U+001B; "" without one."""
+    """First control character of a text as U+001B; "" without one."""
     found = _OBEYED.search(text)
     return f"U+{ord(found[0]):04X}" if found else ""
 
 
 @contextmanager
 def naming(file: object) -> Iterator[None]:
-    """Says of which file the keys are that are refused in a block."""
+    """Add the name of the file to every `DesignFileError` of a block."""
     try:
         yield
     except DesignFileError as error:
@@ -45,7 +45,7 @@ def naming(file: object) -> Iterator[None]:
 
 @contextmanager
 def referring(key: str, name: str) -> Iterator[None]:
-    """Says at which key a file stands that is refused in a block."""
+    """Move every `DesignFileError` of a block to the key that names the file."""
     try:
         yield
     except DesignFileError as error:
@@ -59,7 +59,7 @@ def join(key: str, name: str) -> str:
 
 
 def check_file(path: Path) -> None:
-    """Refuses what is no regular file: a pipe or a device may never come to its end.
+    """Raise unless a path is a regular file: a pipe or a device may never end.
 
     Raises:
         DesignFileError: without key, in the words of the system.
@@ -84,7 +84,7 @@ def refused(key: str, make: Callable[..., T], *args: object, **kwargs: object) -
 
 
 def check_known(key: str, name: str, names: Collection[str]) -> None:
-    """Refuses a name that is none of several."""
+    """Raise if a name is not one of the known names."""
     if name not in names:
         raise DesignFileError(key, not_known(name, names))
 
@@ -95,12 +95,12 @@ def problem(error: Exception) -> str:
 
 
 def not_known(name: object, names: Iterable[str]) -> str:
-    """`"x" is not known`, and what to write instead."""
+    """Message `"x" is not known` with the nearest known name."""
     return f'"{name}" is not known, {suggestion(name, names)}'
 
 
 def suggestion(name: object, valid: Iterable[str]) -> str:
-    """Hint for an unknown name: the nearest valid name, or all of them if none is near."""
+    """Hint for an unknown name: the nearest valid name, or all of them if none is similar."""
     names = sorted(valid)
     near = difflib.get_close_matches(str(name), names, n=1, cutoff=0.5)
     if near:

@@ -52,7 +52,7 @@ class FlankRange:
     step: float = 0.0
 
     def check_on(self, gear: Gear, start_roll_length: Given, common_width: Given, common_middle: Given) -> None:
-        """Refuses a gear whose flank this is not.
+        """Raise unless the range lies on the flank of a gear.
 
         Args:
             gear: of concrete numbers.
@@ -198,7 +198,7 @@ class FlankFileSection(FileTable):
 
 
 def flank_template(section: FlankFileSection, folder: Path, base_radius: float | None) -> template.Template:
-    """The modification of a gear that a table of a design file takes from a file in the folder.
+    """Template of the modification that a table of a design file takes from a flank file.
 
     Args:
         section: the table.
@@ -218,7 +218,7 @@ def flank_template(section: FlankFileSection, folder: Path, base_radius: float |
 
 
 def check_files(parts: Mapping[str, Sequence[template.Template]], pair: GearPair) -> None:
-    """Refuses tables from files that are not on the flank of the gear, of the given name, that they stand at.
+    """Raise if a flank from a file does not lie on the flank of its gear.
 
     Raises:
         DesignFileError: in one line that names the key and the file.
@@ -231,14 +231,14 @@ def check_files(parts: Mapping[str, Sequence[template.Template]], pair: GearPair
 
 
 def check_flank(reach: FlankRange, pair: GearPair, name: str) -> None:
-    """Refuses a table that is not on the flank of the gear of that name, see `FlankRange.check_on`."""
+    """Raise if a table of points does not lie on the flank of the named gear, see `FlankRange.check_on`."""
     middle = pair.face_middles[name == "wheel"]
     reach.check_on(getattr(pair, name), starts(pair)[name], pair.face_width, middle)
 
 
 @dataclass(frozen=True)
 class _FromFile:
-    """Makes the modification of a part whose flank comes from a file: the flank as it is.
+    """Maker of a template whose flank comes from a file: returns the flank unchanged.
 
     Attributes:
         name: of the file.
@@ -255,7 +255,7 @@ class _FromFile:
 def flank_of_rows(
     rows: Rows, base_radius: float | None, method: Method = "linear"
 ) -> tuple[TabulatedProfile | TabulatedFlank, FlankRange]:
-    """The flank of the rows, and where they are.
+    """Flank of the rows, and the range that they cover.
 
     Raises:
         DesignFileError: where they are no flank.
@@ -438,7 +438,7 @@ def _columns(design: str, history: WearHistory) -> dict[str, np.ndarray]:
 
 
 def read_worn(path: str | Path) -> dict[tuple[str, float], Worn]:
-    """Worn flanks (pinion, wheel) by design and revolutions of the pinion, as `write_worn` has written them.
+    """Read worn flanks (pinion, wheel) by design and revolutions of the pinion from a file of `write_worn`.
 
     Raises:
         ValueError: for a file that cannot be read, or without the columns and rows of worn flanks.

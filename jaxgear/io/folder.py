@@ -75,7 +75,7 @@ def _host() -> str:
 
 
 def _is_alive(process: int) -> bool:
-    """Whether a process of this machine runs; True where asking would end it."""
+    """True if a process of this machine runs, or if its state is unknown."""
     if os.name != "posix":
         return True
     try:
@@ -89,7 +89,7 @@ def _is_alive(process: int) -> bool:
 
 @contextmanager
 def writing(path: str | Path) -> Iterator[None]:
-    """Names what is being written when the disk is full, or refuses for another reason.
+    """Name the folder or file in the error of a full disk or another failure to write.
 
     Raises:
         ValueError: in place of an OSError.

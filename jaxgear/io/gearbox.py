@@ -106,7 +106,7 @@ class HousingSection(FileTable):
 
 
 def over_slices(support: ShaftSupport, sizes: Resolution) -> TabulatedSupport:
-    """Shafts that do at every torque what they do at one, as numbers over the slices of a mesh."""
+    """Support by shafts that act alike at every torque, tabulated over the slices of a mesh."""
     y = kinematics(support.pair, real(0.0), sizes, "strain").face_coordinate
     return TabulatedSupport(support.pair, support.influence(y), support.gap(y))
 
@@ -208,7 +208,7 @@ def support_of(
 
 
 def _check_names(shafts: Sequence[ShaftSection]) -> None:
-    """Refuses a name that is given twice, before anything is made of the second: that would be wrong for its place."""
+    """Raise if a name is given twice, before a second object of that name is made."""
     bearings = [bearing for shaft in shafts for bearing in shaft.bearings]
     gears = [gear for shaft in shafts for gear in shaft.gears]
     for parts in (shafts, bearings, gears):
@@ -249,7 +249,7 @@ def _gear(section: _MountedGearSection, pair: GearPair, materials: Materials, of
 
 
 def _differ(one: Material, other: Material) -> bool:
-    """Whether elastic constants differ, as far as they are known."""
+    """True if known elastic constants differ."""
     pairs = (
         (concrete(one.elastic_modulus), concrete(other.elastic_modulus)),
         (concrete(one.poisson_ratio), concrete(other.poisson_ratio)),

@@ -109,7 +109,7 @@ def flank_of(section: GearSection, folder: Path, gear: Template, *, coast: bool)
 
 
 def drawing_of(section: GearSection) -> dict[str, Any]:
-    """Name of the material and measured tooth thickness of a gear as the file gives them, by name and unit.
+    """Name of the material and measured tooth thickness of a gear as given in the file, by name and unit.
 
     Limits are a list of the lower and the upper one.
     """
@@ -120,7 +120,7 @@ def drawing_of(section: GearSection) -> dict[str, Any]:
 
 
 def check_pitches(*sections: GearSection) -> None:
-    """Refuses the diametral pitch of gears of which one is helical: it may be that of either section."""
+    """Raise for a diametral pitch if either gear is helical: it could be transverse or normal."""
     for section in sections:
         if section.written.get("module") == PITCH and any(each.helix_angle for each in sections):
             problem = f"may be that of the transverse section: give {NORMAL_PITCH}, which is it / cos(helix_angle)"
@@ -157,7 +157,7 @@ def _material(key: str, given: str | Template, materials: Materials) -> Template
 
 
 def fixed_material(section: FileTable, given: str | Template | None, materials: Materials) -> Material:
-    """A material of numbers, of a table with such a key, by its name or described; steel for None."""
+    """Material without variables, by its name or its table; steel for None."""
     return _fixed(_material(f"{section.key}.material", _STEEL if given is None else given, materials))
 
 
@@ -168,7 +168,7 @@ def _fixed(part: Template) -> Any:
 
 
 def pair_of(section: PairSection, pinion: Template, wheel: Template) -> Template:
-    """The pair of two gears, with what its table says."""
+    """Template of the pair of two gears, with the keys of its table."""
     _check_alike(pinion, wheel)
     gears = _of_opposite_hands({"pinion": pinion, "wheel": wheel})
     pair = Template(GearPair, gears, section.key).having(**template_of(section, GearPair).fields)
@@ -187,7 +187,7 @@ def pair_of(section: PairSection, pinion: Template, wheel: Template) -> Template
 
 
 def _check_alike(pinion: Template, wheel: Template) -> None:
-    """Refuses gears of different racks, before their other numbers are found to be impossible with them."""
+    """Raise for gears of different racks, which explains further errors of their numbers."""
     for name in ("module", "pressure_angle"):
         first, second = (gear.fields.get(name) for gear in (pinion, wheel))
         if first is None or second is None or isinstance(first, Free) or isinstance(second, Free):
@@ -199,7 +199,7 @@ def _check_alike(pinion: Template, wheel: Template) -> None:
 
 
 def _of_opposite_hands(gears: dict[str, Template]) -> dict[str, Template]:
-    """Both gears, with the helix angle of either of them; gears without one are spur gears."""
+    """Both gears with opposite helix angles, of which the file may give one; spur gears without any."""
     angles = {name: gear.fields[_HAND] for name, gear in gears.items() if _HAND in gear.fields}
     free = [name for name, angle in angles.items() if isinstance(angle, Free)]
     if len(angles) == len(gears) and free:
@@ -214,7 +214,7 @@ def _of_opposite_hands(gears: dict[str, Template]) -> dict[str, Template]:
 
 
 def longest_path(pair: GearPair, part: Template, bounds: Mapping[str, tuple[float, float]]) -> GearPair:
-    """A pair with those values of its free numbers that make its contact lines run the farthest along the path.
+    """Pair with the values of its free numbers that give the largest overlap ratio.
 
     Args:
         pair: with all variables in the middle of their bounds.
@@ -233,7 +233,7 @@ def longest_path(pair: GearPair, part: Template, bounds: Mapping[str, tuple[floa
 
 
 def quality_of(pinion: GearSection, wheel: GearSection) -> list[int] | None:
-    """Flank tolerance classes of both gears; None where they have none."""
+    """Flank tolerance classes of both gears; None if the gears have none."""
     given = {"pinion": pinion.quality_class, "wheel": wheel.quality_class}
     missing = [name for name, number in given.items() if number is None]
     if len(missing) == 1:
@@ -242,7 +242,7 @@ def quality_of(pinion: GearSection, wheel: GearSection) -> list[int] | None:
 
 
 def with_quality(section: Any, own: list[int] | None) -> Any:
-    """A table that needs classes: with its own, or with those of the gears."""
+    """Table with quality classes: its own, or those of the gears."""
     key = f"{section.key}.quality_class"
     if section.quality_class is None:
         if own is None:
@@ -254,7 +254,7 @@ def with_quality(section: Any, own: list[int] | None) -> Any:
 
 
 def both_classes(given: int | list[int] | None) -> tuple[int, int]:
-    """Classes of pinion and wheel of a table that has them, from itself or `with_quality`."""
+    """Classes of pinion and wheel from the key `quality_class` of a table."""
     assert given is not None
     first, second = given if isinstance(given, list) else (given, given)
     return first, second

@@ -26,7 +26,7 @@ _UNIT = re.compile(r"(?P<name>.*?)\s*[\[(]\s*(?P<unit>[^\])]*)[\])]\s*")
 
 @dataclass(frozen=True)
 class Column:
-    """A quantity that a file may hold.
+    """Column that a file may have: name, unit and headings.
 
     Attributes:
         name: heading of the library, with its unit at the end.
@@ -55,7 +55,7 @@ def _known_unit(text: str) -> str:
 
 
 def with_units(names: list[str], cells: Iterable[str]) -> list[str] | None:
-    """Headings with the units of the line below them; None where that line is not one of units."""
+    """Headings with the units of the second line; None if that line has no units."""
     texts = [cell.strip().strip("[]()") for cell in cells]
     if len(texts) != len(names) or not any(texts) or not all(_known_unit(text) for text in texts if text):
         return None
@@ -63,7 +63,7 @@ def with_units(names: list[str], cells: Iterable[str]) -> list[str] | None:
 
 
 def converted(rows: list[dict[str, str]], columns: Iterable[Column]) -> list[dict[str, str]]:
-    """Rows with the headings and units of the library in place of those of the file.
+    """Rows converted to the headings and units of the library.
 
     Raises:
         DesignFileError: for a quantity that is there twice, or without a unit, or in one of another kind.
@@ -112,7 +112,7 @@ def _factor(heading: str, unit: str, wanted: str) -> float:
 
 
 def _scaled(cell: str, factor: float) -> str:
-    """A number times a factor as text; anything else as it is, to be refused where it is used."""
+    """Number times a factor as text; other text unchanged, to be refused where it is used."""
     if factor == 1:
         return cell
     try:

@@ -26,7 +26,7 @@ _DIGITS = 15  # of a converted number: further ones are of the way
 
 
 def names(units: Mapping[str, Number | None], like: str = "") -> dict[str, str]:
-    """Keys of the library by the imperial keys that stand for them.
+    """Keys of the library by their imperial keys.
 
     Args:
         units: number of every key of a table; None for what is no number.
@@ -47,7 +47,7 @@ def names(units: Mapping[str, Number | None], like: str = "") -> dict[str, str]:
 def metric(
     key: str, data: Mapping[str, Any], units: Mapping[str, Number | None]
 ) -> tuple[dict[str, Any], dict[str, str]]:
-    """A table with metric numbers in place of imperial ones, and the keys that the file has for them.
+    """Table with metric numbers in place of imperial ones, and the imperial key of every converted key.
 
     Args:
         key: of the table.

@@ -81,7 +81,7 @@ _FREE = {
 
 
 def model_template(section: ModelSection) -> template.Template:
-    """The model as far as it needs no gears: all of it, or the plane of what `finite_elements` makes."""
+    """Template of the stiffness model without finite-element tables, which need the gears."""
     if section.structure == FINITE_ELEMENTS:
         others = set(section.fields) - {"structure", "plane", *_TABLES}
         if others:

@@ -10,7 +10,7 @@ from .tables import FurtherTable
 
 
 def quantity_named(design: DesignFile, key: str, name: str) -> str | Quantity:
-    """Quantity of a vocabulary name, with settings from a table of the design file where the quantity takes some.
+    """Quantity of a vocabulary name, with settings from the table of the design file that it needs.
 
     Args:
         design: the design file.
@@ -36,7 +36,7 @@ def quantity_named(design: DesignFile, key: str, name: str) -> str | Quantity:
 
 
 def quantities_of_tables(design: DesignFile) -> Iterator[Quantity]:
-    """All quantities of settings but those that solve further, as far as a design file tells what they need."""
+    """All quantities whose settings the design file gives, except those that need further solutions."""
     for quantity in (each for name in quantities for each in quantities.every(name)):
         if quantity.takes is None or _missing(design, quantity):
             continue

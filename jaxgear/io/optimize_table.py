@@ -176,7 +176,7 @@ class OptimizeSection(FurtherTable):
         }
 
     def check(self, design: DesignFile) -> None:
-        """As a search does, whatever method the command line asks for."""
+        """Check the table like a search by the method of the file."""
         if not design.bounds and self.method not in METHODS_WITHOUT_VARIABLES:
             raise DesignFileError("optimize", "has no effect without [variables]")
         if self.verify and isinstance(design.compliance, TabulatedCompliance):
@@ -216,7 +216,7 @@ def known_methods() -> tuple[str, ...]:
 
 
 def _varies(name: str) -> bool:
-    """Whether a method seeks the best values of the variables of a file."""
+    """True if a method optimizes the variables of a file."""
     return name in METHODS and METHODS[name].takes_variables
 
 
@@ -226,7 +226,7 @@ def _made_by(name: str) -> type[Any]:
 
 
 def _check_options(design: DesignFile, name: str, options: Mapping[str, Any]) -> None:
-    """Whether a method with variables can be made of its options, and a method without them of its curve."""
+    """Raise if a method cannot be made of its options."""
     if name in METHODS_WITHOUT_VARIABLES:
         check_known(f"optimize.{name}.curve", options.get("curve", CURVE), CURVES)
         return
@@ -238,7 +238,7 @@ def _check_options(design: DesignFile, name: str, options: Mapping[str, Any]) ->
 
 
 def _options_of(section: OptimizeSection, name: str, *, of_the_file: bool) -> dict[str, Any]:
-    """The options of a method; the file may name others where it is not the file that asks for the method."""
+    """Options of a method; options of other methods are refused only if the file names the method."""
     options = section.options(name)
     shared = {"starts": section.starts, "steps": section.steps, "seed": section.seed or 0}
     taken = {field.name for field in dataclasses.fields(METHODS[name])} if _varies(name) else set()
@@ -277,7 +277,7 @@ _LASTING, _OVER_LIFE = "mean_ppte_over_life", {"starts": 4, "rounds": 1, "steps"
 
 @dataclasses.dataclass(frozen=True)
 class Search:
-    """The search that a design file asks for; call it to run it.
+    """Search defined by a design file; call it to run it.
 
     Attributes:
         design: the design file.
@@ -316,7 +316,7 @@ class Search:
 
     @property
     def finer(self) -> int | None:
-        """Positions of the finer mesh on which it ends; None where it stays on its mesh or chooses later."""
+        """Positions of the finer mesh on which the search ends; None if it ends on its own mesh or chooses later."""
         ends_on_finer = _varies(self.method) or self.method == PARETO
         return self.options.get("positions", POSITIONS) if ends_on_finer else None
 
@@ -336,7 +336,7 @@ class Search:
         return dataclasses.replace(self, method=_DEFAULT_METHOD, problem=kept, options=options)
 
     def __call__(self, mesh: Mesh, callback: Callback | None = None) -> Optimum | Front:
-        """Runs it on a prepared mesh."""
+        """Run the search on a prepared mesh."""
         search = pareto if self.method == PARETO else minimize
         return search(Problem(mesh, **self.problem), callback=callback, **self.options)
 
@@ -448,7 +448,7 @@ _STEPS = {"um": "amount", "mm": "length"}  # keys of [optimize.rounding] by the 
 
 
 def _rounding(design: DesignFile, section: OptimizeSection) -> dict[str, float]:
-    """Steps of the variables; a default without a multiple within the bounds gives way."""
+    """Steps of the variables; a default step without a multiple within the bounds is left out."""
     asked = section.rounding or _RoundingSection("optimize.rounding")
     steps: dict[str, float] = {}
     for name, key in ((name, _STEPS[unit]) for name, unit in design.units.items() if unit in _STEPS):
@@ -463,7 +463,7 @@ def _rounding(design: DesignFile, section: OptimizeSection) -> dict[str, float]:
 
 
 def _check_reachable(design: DesignFile, key: str, of: str | Quantity, low: float | None) -> None:
-    """A life to a limit is known for so many of the lives that are looked at: no design can be shown to last longer."""
+    """Raise for a lower limit of a life beyond the searched range of revolutions, which no design can satisfy."""
     lives = {"life_to_ppte": 1.0, "life_to_depth": MOST_LIVES}
     if low is None or not (isinstance(of, Quantity) and of.name in lives):
         return
@@ -474,7 +474,7 @@ def _check_reachable(design: DesignFile, key: str, of: str | Quantity, low: floa
 
 
 def _check_iteration(design: DesignFile, start: str | None, section: OptimizeSection) -> None:
-    """The iteration levels the transmission error at the design torque and knows nothing else."""
+    """Raise for options that the iteration ignores: it levels the transmission error at the design torque only."""
     keys = ("measure", "level", "torques", "weights", "manufactured", "constraint")
     section.refuse(keys, ' with method "te_iteration"')
     if start == "given" and design.bounds:

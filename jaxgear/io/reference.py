@@ -136,7 +136,7 @@ def _quantities() -> Iterator[str]:
 
 
 def _default(name: str, default: Any, of: Callable[..., Any] | None) -> str:
-    """Default of a key in Markdown: that of the file, else that of the library; "" without one."""
+    """Default of a key in Markdown, from the table or the class of the library; "" without one."""
     if default is None and of is not None:
         known = inspect.signature(of).parameters.get(name)
         default = None if known is None or known.default is inspect.Parameter.empty else known.default

@@ -39,7 +39,7 @@ _CHART_DIGITS = 9  # behind the decimal point: what is read and written again do
 
 
 def write_traces(path: str | Path, traces: Sequence[Trace], measured: Sequence[Trace] | None = None) -> Path:
-    """Writes traces of a flank as CSV, one row per point, as measuring machines and their operators read them.
+    """Write traces of a flank as CSV in the form of gear measuring machines, one row per point.
 
     Columns: trace, face_coordinate_mm, roll_angle_deg, roll_length_mm, diameter_mm, design_um, upper_um, lower_um and,
     with `measured`, measured_um. Limits are empty outside the evaluation range.
@@ -76,7 +76,7 @@ def write_traces(path: str | Path, traces: Sequence[Trace], measured: Sequence[T
 
 
 def _text(value: float) -> str:
-    """The shortest text of a number, nothing for NaN."""
+    """Shortest text of a number; "" for NaN."""
     return "" if np.isnan(value) else repr(round(float(value), _CHART_DIGITS) + 0.0)
 
 

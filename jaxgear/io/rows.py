@@ -91,7 +91,7 @@ _COMMA, _POINT = (re.compile(rf"\s*[+-]?\d*{mark}\d+([eE][+-]?\d+)?\s*") for mar
 
 
 def _check_table(names: list[str], rows: list[list[str]]) -> None:
-    """Refuses what the headings do not fit: decimal commas would be columns of their own."""
+    """Raise if a row has more columns than headings (decimal commas do that)."""
     twice = [name for name in dict.fromkeys(names) if name and names.count(name) > 1]
     if twice:
         raise DesignFileError("", f"has several columns {twice[0]}, must have one")
@@ -171,7 +171,7 @@ def _parquet(path: Path, names: Sequence[str], units: Mapping[str, str]) -> Iter
 
 
 def _columns(known: Sequence[tuple[str, str | None]], names: Sequence[str], units: Mapping[str, str]):
-    """Places of the parameters among the columns of the file, and what turns their numbers into their units."""
+    """Positions of the parameters among the columns of the file, and factors that convert their units."""
     places = {name: [i for i, (other, _) in enumerate(known) if other == name] for name in names}
     missing = [name for name in names if not places[name]]
     if missing:
@@ -200,7 +200,7 @@ def _check_bounds(rows: np.ndarray, bounds: Mapping[str, tuple[float, float]], b
 
 
 def _parts(heading: str) -> tuple[str, str | None]:
-    """Name and unit of a heading, None where it has none."""
+    """Name and unit of a heading; None for a heading without unit."""
     match = _HEADING.fullmatch(heading)
     return (heading, None) if match is None else (match["name"], match["unit"])
 

@@ -38,7 +38,7 @@ class AbstractSpring(eqx.Module):
         return load * self.secant(jnp.maximum(load, LOAD_FLOOR))
 
     def moved(self, distance: Real) -> "AbstractSpring":
-        """The spring of a contact that has moved by a distance; of most springs the same."""
+        """Spring of a contact point that has moved by a distance; by default the same spring."""
         return self
 
 

@@ -18,7 +18,7 @@ _sum = hashlib.sha256
 
 
 def write_durably(path: Path, write: Callable[[BinaryIO], object]) -> None:
-    """Lets `write(file)` fill a temporary file that takes the place of `path` once it is on the disk."""
+    """Write a temporary file by `write(file)` and move it to `path` once it is on the disk."""
     temporary = path.with_name(f".{path.name}.{uuid.uuid4().hex}{TEMPORARY}")
     try:
         with temporary.open("wb") as file:
@@ -38,12 +38,12 @@ def write_durably(path: Path, write: Callable[[BinaryIO], object]) -> None:
 
 
 def sealed(content: bytes) -> bytes:
-    """A content with its checksum."""
+    """Content followed by its checksum."""
     return content + _sum(content).digest()
 
 
 def unsealed(kept: bytes) -> bytes | None:
-    """The content; None where it is damaged."""
+    """Content without its checksum; None if it is damaged."""
     content = kept[: -_sum().digest_size]
     return content if kept == sealed(content) else None
 

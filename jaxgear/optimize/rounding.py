@@ -67,7 +67,7 @@ def rounded(record: Record, steps: Mapping[str, float], polish: Polish) -> Recor
     seen: set[Cell] = set()
 
     def visit(cells: Iterable[Cell], beside: np.ndarray) -> bool:
-        """Whether one of those that are new is better than all before."""
+        """True if one of the new points is better than all before."""
         new = [cell for cell in dict.fromkeys(cells) if cell not in seen]
         seen.update(new)
         before = found.violation, found.value

@@ -291,7 +291,7 @@ def laid_out_size(ax: Axes) -> tuple[float, float]:
 
 
 def _lay_out(figure: Figure) -> None:
-    """Finds the places of everything in a figure, which drawing it would do too, and more."""
+    """Compute the places of all artists without drawing the figure."""
     engine = figure.get_layout_engine()
     if engine is None:  # a figure of the user's
         figure.draw_without_rendering()
@@ -304,7 +304,7 @@ def _in_points(ax: Axes, pixels: float) -> float:
 
 
 def _root(ax: Axes) -> Figure:
-    """The figure of the Axes, also if they stand in a subfigure."""
+    """Figure of the Axes, also if the Axes are in a subfigure."""
     canvas: Any = ax.figure.canvas
     return canvas.figure
 

@@ -453,7 +453,7 @@ def _style(index: int, count: int) -> dict[str, Any]:
 
 
 def _label(index: int, count: int, text: str = "") -> str:
-    """Number of the state, of many states only those of some."""
+    """Number of the state; if there are many, only some states are numbered."""
     shown = np.unique(np.linspace(0, count - 1, min(count, _LABELLED)).round().astype(int))
     if index not in shown:
         return f"_{index}"  # matplotlib leaves labels with an underscore out of the legend

@@ -181,7 +181,7 @@ def pressure(cycles: Mapping[str, MeshCycle], ax: Axes | None = None) -> Axes:
 
 
 def _two_scales(ax: Axes, flank: float, corner: float) -> float:
-    """Makes the scale linear up to the first tick above the flank pressure, and logarithmic from there; that tick."""
+    """Make the scale linear up to the first tick above the flank pressure and logarithmic beyond; returns the tick."""
     linear = MaxNLocator(nbins=5).tick_values(0.0, max(flank, 1.0))
     end = float(linear[-1])
     ax.set_yscale("symlog", linthresh=end, linscale=_LINEAR)

@@ -42,7 +42,7 @@ _LABEL_WIDTH, _CELL_WIDTH = 32, 10  # of a table whose columns must fit [charact
 
 @dataclass
 class Table:
-    """A table of texts, which a terminal prints and a report holds.
+    """Table of texts for terminal and report.
 
     Attributes:
         header: one text per column.
@@ -174,7 +174,7 @@ _UPRIGHT = 210.0
 def write_report(
     path: Path, title: str, subtitle: str, facts: Sequence[tuple[str, str]], sections: Sequence[Chapter]
 ) -> None:
-    """Writes a report as one HTML file that refers to nothing outside of it.
+    """Write a report as one HTML file without external references.
 
     All text is escaped: names and contents of files may hold anything.
 
@@ -204,7 +204,7 @@ def write_text(path: Path, text: str) -> None:
 
 
 def rendered(template: str, **parts: object) -> str:
-    """A page of a template, with the parts that it asks for."""
+    """Page rendered from a template and the parts that it uses."""
     import jinja2
 
     environment = jinja2.Environment(
@@ -219,7 +219,7 @@ def rendered(template: str, **parts: object) -> str:
 
 
 def printable(text: str) -> str:
-    """A text without what cannot stand in a page: the name of a file may hold bytes that are no text, or controls."""
+    """Text without characters that HTML does not allow, such as controls and undecodable bytes of file names."""
     return "".join(
         sign if sign.isprintable() or sign in "\n\t\r" or category(sign) == "Zs" else "\ufffd" for sign in text
     )
@@ -233,7 +233,7 @@ _MM = 1000.0  # per m
 
 
 def picture(path: Path, caption: str) -> Picture:
-    """A PNG file with its density written in it, to be embedded.
+    """Content of a PNG file with its density added, for embedding.
 
     Raises:
         ValueError: when it is no such file.
@@ -263,7 +263,7 @@ def heading(name: str) -> str:
 
 
 def text(value: object) -> str:
-    """A value in six digits, as the whole report writes it; "-" where there is none."""
+    """Value in six digits for reports; "-" for None."""
     if isinstance(value, Mapping):
         return ", ".join(f"{heading(key)} {text(item)}" for key, item in value.items()) or "-"
     items = value if isinstance(value, list | tuple) else np.asarray(value)
@@ -281,7 +281,7 @@ def text(value: object) -> str:
 
 
 def numbers(data: Mapping[str, Any], within: Sequence[str] = ()) -> Iterator[tuple[str, str]]:
-    """Name and text of everything that nested data hold, in their order."""
+    """Name and text of all values of nested data, in order."""
     for name, value in data.items():
         names = (*within, heading(name))
         if isinstance(value, Mapping) and value:

@@ -15,7 +15,7 @@ Row = TypeVar("Row", contravariant=True)
 
 @dataclass(frozen=True)
 class Record(Generic[Row]):
-    """A number of every row of a result, such as of a design, a run or a gear.
+    """Number of every row of a result, such as a design, a run or a gear.
 
     Attributes:
         name: name without the unit, as files carry it.
@@ -42,7 +42,7 @@ class Record(Generic[Row]):
 
 
 def numbers_of(records: Sequence[Record[Row]], row: Row) -> dict[str, Any]:
-    """Numbers of a row by key, without those that it does not have."""
+    """Numbers of a row by key; records that are None for the row are left out."""
     found = {record.key: _plain(record.of(row)) for record in records}
     return {key: value for key, value in found.items() if value is not None}
 
@@ -61,7 +61,7 @@ def table_of(
     across: bool = False,
     note: str = "",
 ) -> Table:
-    """Table of those records that have a heading and that every row has.
+    """Table of the records that have a heading and a value in every row.
 
     Args:
         records: numbers of a row.

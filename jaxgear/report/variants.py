@@ -20,7 +20,7 @@ _WIDEST, _MARGIN = 30, 4  # of a column [characters]
 
 
 def write_workbook(path: Path, facts: Sequence[tuple[str, str]], best: SweepTable, table: SweepTable) -> None:
-    """Writes three sheets: what the workbook is about, the best variants, and the table.
+    """Write a workbook of three sheets: description, best variants, whole table.
 
     Units are in the header, which is frozen and filters the columns. Of more than `MOST_ROWS` variants the best by the
     first result are written. Results of failed variants are empty cells.
@@ -114,7 +114,7 @@ def write_variants(
     facts: Sequence[tuple[str, str]],
     table: SweepTable,
 ) -> None:
-    """Writes a page that holds everything in itself, the library that draws it included, and refers to nothing.
+    """Write a self-contained interactive page, including its drawing library.
 
     The first column of every result has an axis of its own, the others can be chosen for the Pareto front. Of more than
     `MOST_ROWS` variants the best by the first result, the Pareto front of the first two and an even share of the others

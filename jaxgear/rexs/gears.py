@@ -285,7 +285,7 @@ def _complete(
 
 
 def read_quality(gear: Component) -> int | None:
-    """Flank tolerance class of ISO 1328-1:2013, None where it names none."""
+    """Flank tolerance class of ISO 1328-1:2013; None if it is missing."""
     if QUALITY not in gear.attributes:
         return None
     return int(gear.choice(QUALITY, None, [str(number) for number in range(1, 12)]))
@@ -352,7 +352,7 @@ def _manufacturing(model: Model, flank: Component, owner: str, completed: Comple
 
 
 def _relative(part: Component, coefficient: str, module: float) -> float | None:
-    """A coefficient of the module, which may be given as a length; None where it is not."""
+    """Coefficient of the module, also if the file gives a length; None if it is missing."""
     value = part.number(coefficient, "none")
     if value is not None:
         return value

@@ -50,7 +50,7 @@ def rack_by_hand(owner: str) -> str:
 
 @dataclass
 class Completed:
-    """Numbers beside those of the file.
+    """Numbers that the user adds to those of the file.
 
     Attributes:
         given: by their keys, in the units of a design file.

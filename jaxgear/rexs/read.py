@@ -325,7 +325,7 @@ def _modification(model: Model, gear: Component, flank: Component, frame: Frame)
 
 
 def _differ(frame: Frame, one: AbstractModification, other: AbstractModification, sign: int = 1) -> bool:
-    """Whether two modifications differ, the second one at face coordinates times `sign`."""
+    """True if two modifications differ, the second one at face coordinates times `sign`."""
     roll, face = np.meshgrid(np.linspace(frame.start, frame.tip, 33), np.linspace(-0.5, 0.5, 61) * frame.width)
     return bool(np.abs(frame.removed(one, roll, face) - frame.removed(other, roll, sign * face)).max() > _ALIKE)
 

@@ -90,7 +90,7 @@ class ComparisonResult(AbstractStudyResult):
         return {name: {key: of.factors[key] for key in FACTORS} for name, of in self.evaluations.items()}
 
     def write(self, folder: Path) -> None:
-        """Write the flanks of all designs to `flanks.csv`, and what tables of the file add to them."""
+        """Write the flanks of all designs to `flanks.csv`, and the files that further tables add."""
         write_flanks(folder / "flanks.csv", self.mesh, side_by_side.flanks(self.evaluations))
         for name, part in self.parts.items():
             if part.lines:
@@ -98,7 +98,7 @@ class ComparisonResult(AbstractStudyResult):
                     csv.writer(file).writerows(part.lines)
 
     def reported(self, folder: Path, facts: Sequence[tuple[str, str]], *, figures: bool) -> Self:
-        """The result, after a workbook of what tables of the file add to it, where the library for it is installed."""
+        """The result, after writing a workbook of the data of further tables if the library for it is installed."""
         for name, part in self.parts.items():
             if find_spec("xlsxwriter") is not None:
                 tables = [table for chapter in part.chapters for table in chapter.tables]
@@ -159,7 +159,7 @@ class ComparisonResult(AbstractStudyResult):
                     yield f"{name}: by finite elements, {key}", value
 
     def chapters(self) -> Iterator[Chapter]:
-        """Robustness, where the file has tolerances, what tables of the file add, and the stresses by ISO 6336."""
+        """Chapters on robustness, further tables and ISO 6336 stresses."""
         yield from manufactured.pages(self.design, self.evaluations)
         for part in self.parts.values():
             yield from part.chapters

@@ -49,7 +49,7 @@ class _Task(NamedTuple):
 
 
 class Evaluator:
-    """Evaluates variants in blocks of one size, so that one compilation serves them all.
+    """Evaluation of variants in blocks of one size by a single compiled program.
 
     Attributes:
         columns: columns of the results.
@@ -301,7 +301,7 @@ def _fill(evaluator: Evaluator, plan: AbstractPlan, store: Store, callback: Call
 
 
 def _run(evaluator: Evaluator, plan: AbstractPlan, store: Store, parts: dict[int, bool], keep, callback) -> None:
-    """Evaluates parts and hands them to `keep(part, columns)` in order; `parts` tells of each whether it is missing."""
+    """Evaluate parts and pass them to `keep(part, columns)` in order; `parts` gives for each whether it is missing."""
     rows = {part: store.span(part)[1] - store.span(part)[0] for part in parts}
     done, total = sum(rows[part] for part in parts if not parts[part]), sum(rows.values())
     report = callback or (lambda done, total, best: None)
@@ -337,7 +337,7 @@ def _wait(there: Callable[[], bool]) -> None:
 
 
 def _measures(conditions: Conditions, given: Sequence[AbstractMeasure] | None) -> tuple[AbstractMeasure, ...]:
-    """The measures that are asked for; the usual ones where nothing is said, none for a single case."""
+    """Requested measures; default measures if none are given, none for a single case."""
     if given is None:
         if conditions.samples > 1:
             return Mean(), Quantile()
@@ -378,12 +378,12 @@ def _digest(tree) -> str:
 
 
 def _design_digest(traced) -> str:
-    """Digest of what the variables make: a function has no other identity that outlives the process."""
+    """Digest of a traced program and its constants, which identifies a function across processes."""
     return digest(_without_addresses(str(traced.jaxpr)) + _digest(traced.consts))
 
 
 def _own_digest(made: Variants, example: np.ndarray, results: Sequence[Quantity]) -> str | None:
-    """Digest of what quantities compute that are not those of the vocabulary; None without any."""
+    """Digest of the programs of quantities outside the vocabulary; None without any."""
     own = [of for of in results if quantities.get(of.name) is not of]
     if not own:
         return None

@@ -257,7 +257,7 @@ class SweepTable:
         return xarray.Dataset(variables, attrs={"title": self.title})
 
     def __arrow_c_stream__(self, requested_schema: object = None) -> object:
-        """The table part by part, for whatever takes Arrow data: `polars.DataFrame(table)`, `pyarrow.table(table)`."""
+        """The table as an Arrow stream, for `polars.DataFrame(table)` or `pyarrow.table(table)`."""
         import pyarrow
 
         reader = pyarrow.RecordBatchReader.from_batches(self._schema, self._stream())
@@ -315,7 +315,7 @@ def in_memory(title: str, columns: Sequence[Column], tables: Sequence[Any]) -> S
 
 
 def open_sweep(folder: str | Path) -> SweepTable:
-    """Opens the table of a finished sweep, and reads it once to see that it is undamaged.
+    """Open the table of a finished sweep and read it once to check that it is undamaged.
 
     Args:
         folder: the output of a sweep.

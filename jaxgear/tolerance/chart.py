@@ -53,7 +53,7 @@ class Trace(Checked):
 
 
 class FlankPlace(NamedTuple):
-    """A place along the profile, or several of them, in the three ways that machines ask for it.
+    """Places along the profile as roll length, roll angle and diameter.
 
     Attributes:
         roll_length: [mm].
@@ -192,7 +192,7 @@ def _helix(
 def table_traces(
     side: Side, table: TabulatedProfile | TabulatedFlank, tolerance: ToleranceClass | None = None
 ) -> list[Trace]:
-    """Profile traces of a tabulated flank at the places of its table: what a machine has measured, as it was.
+    """Profile traces of a tabulated flank at the points of its table, such as measured points.
 
     Args:
         side: the gear's side of the contact, of `mesh.sides`.
@@ -246,7 +246,7 @@ def _deviations(place: Points, deviation: Points, low: Scalar, high: Scalar, end
 
 
 def _between(place: Points, low: Scalar, high: Scalar) -> Bool[Array, " points"]:
-    """Whether places lie within a range; rounding leaves none of its ends out."""
+    """True for places within a range including its ends, up to rounding."""
     slack = _ROUNDING * jnp.finfo(place.dtype).eps * (jnp.abs(low) + jnp.abs(high))
     return (place >= low - slack) & (place <= high + slack)
 
