@@ -22,7 +22,7 @@ from typing import Any
 
 
 def provided(group: str) -> dict[str, Any]:
-    """Entry points by their names, those of folders of this package first.
+    """Entry points by name; the folders of this package come first.
 
     Args:
         group: "tables", "quantities", "studies", "commands" or "formats". A command is a function with the options

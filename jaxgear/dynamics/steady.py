@@ -85,7 +85,7 @@ def _of_orbit(oscillator, frequency, start, periods: int, steps: int, recorded: 
 def _orbit_of(
     oscillator, frequency, start, periods: int, steps: int, recorded: SteadyNumbers
 ) -> tuple[Orbit, Bool[Array, ""]]:
-    """Orbit next to a settled state, and True if it agrees with the recorded motion."""
+    """Orbit near a settled state, and True if it agrees with the recorded motion."""
     orbit = find_orbit(oscillator, frequency, start, periods=periods, steps=steps)
     scale = recorded.dte_rms + jnp.finfo(orbit.dte_rms.dtype).eps ** 0.5 * jnp.abs(orbit.dte_mean)
     same = jnp.abs(orbit.dynamic_factor - recorded.dynamic_factor) <= _SAME * recorded.dynamic_factor

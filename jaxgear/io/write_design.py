@@ -46,7 +46,7 @@ def write_starter(
     pressure_angle: float = 20.0,
     profile_shift: tuple[float, float] = (0.0, 0.0),
 ) -> GearPair:
-    """Writes a commented design file of a pair, which `jaxgear analyze` and `jaxgear optimize` take as it is.
+    """Write a commented design file of a pair, ready for `jaxgear analyze` and `jaxgear optimize`.
 
     Args:
         path: of the TOML file, which must not exist.
@@ -151,7 +151,7 @@ def write_design(
     quality_classes: tuple[int, int] | None = None,
     title: str = "",
 ) -> None:
-    """Writes a design file. It appears as a whole or not at all, in place of an earlier one.
+    """Write a design file as a whole or not at all, in place of an earlier one.
 
     Args:
         path: of the TOML file.
@@ -218,5 +218,5 @@ def _value(value: Any) -> str:
 
 
 def _text(text: str) -> str:
-    """A basic string of TOML, whose escapes are those of JSON."""
+    """Text as a basic string of TOML, with the escapes of JSON."""
     return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")

@@ -43,7 +43,7 @@ _SHORTEST = 0.05  # of the active profile; a polynomial over less is none
 
 
 class WheelSpline(Checked):
-    """Involute and polynomial, and how far they are from the design along the active profile.
+    """Wheel profile of an involute and a polynomial, and its deviation from the design along the active profile.
 
     Attributes:
         node_roll_length: of the node [mm].
@@ -203,7 +203,7 @@ def _check(degree: int, criterion: str) -> None:
 
 
 def _relief_length(modification: AbstractModification) -> Scalar | None:
-    """Length of a tip relief [mm] that is the only modification along the profile; None for anything else."""
+    """Length of the tip relief [mm] if it is the only profile modification; else None."""
     parts = [part.modification if isinstance(part, Scaled) else part for part in terms(modification)]
     along = [part for part in parts if not isinstance(part, LeadCrowning | LeadSlope | EndRelief)]
     return along[0].length if len(along) == 1 and isinstance(along[0], TipRelief) else None

@@ -69,7 +69,7 @@ def _contact_ratio(side: Side) -> Scalar:
 
 
 def ground_volume(side: Side, modification: AbstractModification, *, stock: Given = 0.0) -> Scalar:
-    """Volume that finishing takes off one gear [mm^3]: the modification and the stock that roughing has left.
+    """Volume that grinding removes from one gear [mm^3]: modification and grinding stock.
 
     Args:
         side: the gear's side of the contact, of `mesh.sides`.
@@ -95,7 +95,7 @@ def ground_area(side: Side) -> Scalar:
 
 
 def relative_volume(side: Side, modification: AbstractModification, *, parabolic: bool = False) -> Scalar:
-    """Removed volume over that of a linear relief from the pitch point, or a parabolic one, of the same tip amount.
+    """Removed volume over the volume of a linear or parabolic relief from the pitch point with the same tip amount.
 
     Zero where nothing is removed at the tip.
     """
@@ -112,7 +112,7 @@ def _addendum(side: Side) -> Scalar:
 
 
 def _curves() -> tuple[AbstractCurve, AbstractCurve]:
-    """Linear and parabolic; made when they are asked for, so that importing makes no array."""
+    """Linear and parabolic curve; a function, so that the import creates no array."""
     return Linear(), Quadratic(real(0.0), real(0.0), real(1.0))
 
 

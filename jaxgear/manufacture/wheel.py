@@ -76,7 +76,7 @@ def _space_flank(
 def space_point(
     side: Side, roll_length: Float[Array, "..."], removed: Float[Array, "..."]
 ) -> tuple[Float[Array, "..."], ...]:
-    """x, y [mm] and inclination [rad] of points of the flank with so much material removed [um]."""
+    """Coordinates x, y [mm] and inclination [rad] of points of a flank after the removal of material [um]."""
     gear = side.gear
     check_spur(gear)
     base = jnp.broadcast_to(gear.base_radius, roll_length.shape)
@@ -164,7 +164,7 @@ def wheel_profile(side: Side, modification: AbstractModification, *, points: int
 
 @program
 def grinding_margins(side: Side, modification: AbstractModification) -> GrindingMargins:
-    """How far a tooth space is from what no wheel can grind; differentiable."""
+    """Margins of a tooth space that a form wheel can grind; differentiable."""
     flank = space_flank(side, modification)
     angle = jnp.arctan2(jnp.diff(flank.x), jnp.diff(flank.y))
     clearance = side.start_roll_length - outline(side.gear).form_roll_length
@@ -182,7 +182,7 @@ def smallest_wheel_radius(side: Side, flange_radius: Given) -> Scalar:
 
 
 def run_out(side: Side, radius: Given) -> Scalar:
-    """How far the axis of a wheel of a radius [mm] travels beyond the face until it has left the tooth space [mm].
+    """Travel of the wheel axis beyond the face until the wheel has left the tooth space [mm], for a wheel radius [mm].
 
     A chord of the wheel at full depth t: sqrt(t (2 R - t)). A shoulder beside the gear must be farther away.
 
@@ -208,7 +208,7 @@ def largest_wheel_radius(side: Side, gap: Given) -> Scalar:
 
 
 def grinding_faults(wheel: GrindingWheel, side: Side, modification: AbstractModification) -> tuple[str, ...]:
-    """Why a wheel cannot grind a concrete gear, one line each; empty if it can."""
+    """Reasons why no wheel can grind a concrete gear, one line each; empty if one can."""
     margins, faults = grinding_margins(side, modification), []
     for name, value, unit in (
         ("form_clearance", margins.form_clearance, "mm"),

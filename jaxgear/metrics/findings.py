@@ -288,7 +288,7 @@ def _lengths(modification: AbstractModification, profile: float, half_face: floa
 
 
 def _of_end_reliefs(sizes: Resolution, face_width: float, overhangs, flanks) -> Iterator[Finding]:
-    """Whether end reliefs reach the common face, at both ends where they are at both, and slices that show them."""
+    """Findings on end reliefs beyond the common face, and on slices that cannot resolve them."""
     for where, ends, modification in zip(("pinion", "wheel"), overhangs, flanks):
         for term in jax.tree.leaves(modification, is_leaf=lambda part: isinstance(part, EndRelief)):
             if isinstance(term, EndRelief) and term.varies_along_face:

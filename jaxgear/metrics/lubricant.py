@@ -53,7 +53,7 @@ BASES: Mapping[str, _BaseOil] = {
 
 
 class Lubricant(AbstractSettings):
-    """An oil as it is used: its data sheet, its temperature, the flanks it runs on, and what tests have shown of it.
+    """Lubricant in operation: data sheet, temperature, flank surfaces and test results.
 
     `quantity` gives with it the numbers of the lubricated mesh, `metrics.LUBRICANT_QUANTITIES`.
 
@@ -121,7 +121,7 @@ class Lubricant(AbstractSettings):
 
     @property
     def slipperiness(self) -> Scalar:
-        """X_L: given, or that of the kind of oil."""
+        """Lubricant factor X_L: the given one, or the value of the kind of oil."""
         if self.friction_factor is not None:
             return self.friction_factor
         return jnp.full_like(self.viscosity_40, BASES[self.base].friction_factor)
@@ -153,7 +153,7 @@ class Lubricant(AbstractSettings):
 
 
 def _check_less(lubricant: Lubricant, name: str, other: str, unit: str) -> None:
-    """Refuses a number that is not less than another one; tracers pass."""
+    """Raise unless a number is less than another one; tracers pass."""
     given = getattr(lubricant, name), getattr(lubricant, other)
     known = [concrete(value) for value in given if value is not None]
     if len(known) < len(given) or any(value is None for value in known):

@@ -261,7 +261,7 @@ def lubricated_flash_temperature(cycle: MeshCycle, lubricant: Lubricant) -> Load
 
 @over_batch
 def bulk_temperature(cycle: MeshCycle, lubricant: Lubricant) -> Scalar:
-    """Temperature of the teeth between two contacts [degC]: that of the oil and a rise, by `lubricant.bulk`
+    """Bulk temperature of the teeth [degC]: oil temperature and a rise by `lubricant.bulk`.
 
     "flash"  0.47 X_S T_flm, T_flm the flash temperature as a mean over path of contact and face (ISO/TS 6336-20)
     "loss"   7400 (P / (a b))^0.72 X_S / 1.2 with the loss power P [kW], centre distance and face width [mm]
@@ -287,7 +287,7 @@ def loss_rise(loss: Given, area: Given) -> Real:
 
 @over_batch
 def contact_temperature(cycle: MeshCycle, lubricant: Lubricant) -> Load:
-    """Temperature in the contact [degC], bulk and flash temperature; that of the bulk where the flanks are apart."""
+    """Contact temperature [degC], bulk and flash temperature; bulk temperature without contact."""
     return bulk_temperature(cycle, lubricant) + lubricated_flash_temperature(cycle, lubricant)
 
 

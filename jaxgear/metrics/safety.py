@@ -161,7 +161,7 @@ def _strengths_of(strength: Strength, name: str) -> tuple[Scalar, Scalar]:
 
 
 def _given_strength(settings: Checked, name: str) -> Scalar:
-    """A number of settings; raises a `ValueError` where it is not given."""
+    """Strength of the settings; raises a `ValueError` if it is missing."""
     value = getattr(settings, name)
     if value is None:
         raise ValueError(f"needs {type(settings).__name__}.{name}")

@@ -91,7 +91,7 @@ class ContactFactors(NamedTuple):
 
 
 def contact_factor_squares(pair: GearPair, path: PathOfContact) -> ContactFactors:
-    """The factors of `nominal_contact_stress` that belong to a pair, whatever its load."""
+    """Squares of the factors of `nominal_contact_stress` that are independent of the load."""
     overlap = jnp.minimum(pair.overlap_ratio, 1.0)
     pitch = path.reduced_radius(jnp.zeros_like(path.end))
     inner, outer = (pitch / path.reduced_radius(single) for single in (path.inner_single, path.outer_single))
@@ -141,7 +141,8 @@ class CriticalSection(Checked):
 
 
 class RootFactors(Checked):
-    """Form factor Y_F and stress correction factor Y_S at given load points, and what they are made of.
+    """Form factor Y_F and stress correction factor Y_S at given load points, with the dimensions of the critical
+    section.
 
     Attributes:
         form, correction: Y_F, Y_S.
@@ -176,7 +177,7 @@ class NominalRootStress(Checked):
 
 
 def critical_section(gear: Gear) -> CriticalSection:
-    """Section of the generated root at the 30 degree tangent; of helical gears that of the normal section."""
+    """Section of the generated root at the 30 degree tangent, in the normal section of helical gears."""
     gear = _of_normal_section(gear)
     if gear.cutter is not None:
         return _section_by_cutter(curves(gear))

@@ -33,7 +33,7 @@ def over_batch(function: Function) -> Function:
 
 
 def on_both(function: Callable[[T], Result], first: T, second: T) -> tuple[Result, Result]:
-    """A function of two things alike: evaluated once on both together, which halves what there is to compile.
+    """Apply a function to two inputs of the same structure in one batch, which halves the program.
 
     Things that differ in their structure, or in the shape or type of an array, are evaluated one after the other.
     """

@@ -48,7 +48,7 @@ Matrix = Float[Array, "springs springs #slices positions"]
 
 
 def eliminable(problem: ContactProblem) -> ContactProblem:
-    """The problem with what its eliminations need to be evaluated once."""
+    """Problem with the quantities that all of its eliminations share."""
     if problem.coupling is None:
         return problem
     return eqx.tree_at(lambda p: p.coupling, problem, with_inverse(problem.coupling))
@@ -84,7 +84,7 @@ def eliminate(problem: ContactProblem, active: Active, slope: Slopes) -> Factors
 
 
 class Response(NamedTuple):
-    """Line loads, common approach, and what presses the slices besides what is known."""
+    """Line loads and common approach of a linear system, and the further loads on the slices."""
 
     load: Rows
     approach: Curve
@@ -211,7 +211,7 @@ def tangent_stiffness(problem: ContactProblem, solution: ContactSolution) -> Cur
 
 @partial(jax.custom_jvp, nondiff_argnums=(0, 1))
 def _solve(steps: int, tolerance: float, problem: ContactProblem, common: Curve) -> tuple[Rows, Curve, Curve]:
-    """The iterate v, the approach and the residual; `common` is what has been taken out of the gaps."""
+    """Iterate v, approach and residual; `common` is the part that was subtracted from all gaps."""
     if problem.known is not None:
         load, left, approach = jax.lax.stop_gradient(problem.known)
         return list(jnp.where(load > 0, load, -left)), approach - common, jnp.zeros_like(common)
@@ -243,7 +243,7 @@ def _near(problem: ContactProblem) -> tuple[Rows, Curve]:
 def _iterate(
     steps, tolerance, problem: ContactProblem, single: ContactProblem, common: Curve, v: Rows, approach: Curve
 ):
-    """Newton steps until the problem is solved everywhere, each as a correction of what is left of the conditions.
+    """Newton steps until all positions are solved, each as a correction of the residual of the conditions.
 
     With slopes in single precision a step still gains six digits, at half the cost; so it does where coupled slices are
     eliminated in single precision. Others are eliminated quickly anyway.
@@ -297,7 +297,7 @@ def _solve_jvp(steps, tolerance, primals, tangents):
 
 
 def _start(problem: ContactProblem) -> tuple[Rows, Slopes]:
-    """Equal loads on every spring that can be in contact at all, and the secants under them.
+    """Equal loads on all springs that can be in contact, and the secants under these loads.
 
     The secants do not depend on the gaps: for many problems that differ in their gaps alone they are evaluated once.
     """

@@ -43,7 +43,7 @@ class AbstractSpring(eqx.Module):
 
 
 class Known(NamedTuple):
-    """A solution that has been found before: nothing is iterated, and its derivatives are those of the problem.
+    """Known solution of a problem: it is not iterated, and its derivatives are the derivatives of the problem.
 
     Attributes:
         line_load, opening, approach: as in `ContactSolution`.
@@ -98,7 +98,7 @@ class ContactProblem(eqx.Module):
 
 
 class ContactSolution(eqx.Module):
-    """Line loads, common approach, what is left of the gaps, and how well the conditions hold.
+    """Line loads, common approach, gaps under load, and residual of the conditions.
 
     Attributes:
         line_load: q, shape (springs, slices, positions).
@@ -134,12 +134,12 @@ def carried_by(v: Rows) -> Rows:
 
 
 def secants_under(problem: ContactProblem, load: Rows) -> Slopes:
-    """Deflection per load of every spring; all springs at once, so that a program holds the law once."""
+    """Deflection per load of all springs, evaluated at once so that the program contains the law once."""
     return list(problem.law.secant(jnp.maximum(jnp.stack(load), LOAD_FLOOR)))
 
 
 def slopes_under(problem: ContactProblem, load: Rows, secant: Slopes) -> Slopes:
-    """Its derivative; the secants are those under the same loads."""
+    """Derivative of the deflection by the load of all springs; takes the secants under the same loads."""
     q, c = jnp.stack(load), jnp.stack(secant)
     return list(jnp.where(q > LOAD_FLOOR, problem.law.slope(jnp.maximum(q, LOAD_FLOOR), c), c))
 

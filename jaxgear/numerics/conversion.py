@@ -25,7 +25,7 @@ _SHOWN = 6  # numbers of an array that are printed; of a longer one its range is
 
 
 def real(value: Numbers, what: str = "") -> Float[Array, "..."]:
-    """Converts to an inexact array: arrays of floats keep their dtype, everything else takes JAX's default float.
+    """Convert to an inexact array: float arrays keep their dtype, other inputs take the default float of JAX.
 
     Numbers stay concrete inside traced functions, so that they are checked there too.
 
@@ -59,7 +59,7 @@ def _inexact(value) -> Float[Array, "..."]:
 
 
 def real_or_given(value: object) -> object:
-    """A number field's value: anything else stays as it is for the check, which knows its name."""
+    """Value of a number field as an array; other values unchanged, for the check that names the field."""
     try:
         return optional_real(cast(Numbers | None, value))
     except ValueError:
@@ -79,7 +79,7 @@ def optional_real(value: Numbers | None) -> Float[Array, "..."] | None:
 
 
 def concrete(value: Numbers) -> np.ndarray | None:
-    """The value as a NumPy array, or None while it is being traced."""
+    """Value as a NumPy array; None if it is traced."""
     return None if isinstance(value, jax.core.Tracer) else np.asarray(value)
 
 

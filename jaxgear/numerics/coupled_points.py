@@ -91,6 +91,6 @@ def _at(active: Bool[Array, " points"], compliance, gap, load):
 
 
 def _signs(force: Vector, opening: Vector) -> Bool[Array, " points"]:
-    """Which points should be in contact: those that press, and those that overlap; the nearest to it at least."""
+    """Points that should be in contact: those under load or overlapping, at least the nearest one."""
     value = jnp.where(opening == 0, force, -opening)
     return value >= jnp.minimum(jnp.max(value), 0.0)

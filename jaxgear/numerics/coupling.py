@@ -76,7 +76,7 @@ class SliceCoupling(eqx.Module):
     inverse: Blocks | None = None
 
     def local(self, springs: int) -> Float[Array, "springs springs #slices positions"]:
-        """Compliance of every slice on its own, of so many springs in each."""
+        """Compliance of every uncoupled slice for a number of springs per slice."""
         local = reduce(add, [body.rest * body.compliance for body in self.bodies])[:, :, None]
         if self.scale is None:
             return local
@@ -102,7 +102,7 @@ class SliceCoupling(eqx.Module):
         return [sum(rows[first + count :: count], rows[first]) for first in range(count)]
 
     def deflection(self, weight: Weight, lever: Levers, load: Rows) -> Rows:
-        """y under line loads, beyond that of the slices on their own."""
+        """Deflection y under line loads, without the compliance of the uncoupled slices."""
         modal = stored(onto(weight[:, None] * self.modes, jnp.stack(self.places(load))))
         pressed = [along(body.share, summed(body.compliance[None] * modal[:, None], 2)) for body in self.bodies]
         deflected = along(self.modes, stored(reduce(add, pressed)))
@@ -226,7 +226,7 @@ class CoupledFactors(NamedTuple):
 
 
 def couple(coupling: SliceCoupling, weight: Weight, lever: Levers, inverse: Inverse) -> CoupledFactors:
-    """Eliminates what couples the slices.
+    """Eliminate the coupling of the slices.
 
     Args:
         coupling: with its inverse.

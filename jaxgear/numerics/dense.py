@@ -112,7 +112,7 @@ def pivots(matrix: Matrix) -> Float[Array, " n"]:
 
 
 def positive_definite(matrix: Matrix) -> Bool[Array, ""]:
-    """Whether all eigenvalues of a symmetric matrix are positive: as many as pivots are (Sylvester's law of inertia).
+    """True if all eigenvalues of a symmetric matrix are positive, by its pivots (Sylvester).
 
     They are above x where matrix - x I is positive definite. False where a number is NaN.
     """

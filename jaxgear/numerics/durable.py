@@ -49,7 +49,7 @@ def unsealed(kept: bytes) -> bytes | None:
 
 
 def digest(text: str, arrays: Iterable[Any] = ()) -> str:
-    """Digest of a text and of arrays, of which type and shape count."""
+    """Digest of a text and of the type, shape and content of arrays."""
     found = _sum(text.encode())
     for array in map(np.asarray, arrays):
         found.update(f"{array.dtype}{array.shape}".encode() + array.tobytes())
@@ -81,7 +81,7 @@ class FileStore:
         return unsealed(kept)
 
     def write(self, made_of: bytes, content: bytes) -> None:
-        """Write a content; do nothing where the disk does not allow it."""
+        """Write a content; do nothing if the disk does not allow it."""
 
         def write(file):
             if self._executed:
@@ -119,7 +119,7 @@ def _read_own(path: Path) -> bytes:
 
 
 def _is_own(status: os.stat_result) -> bool:
-    """Whether this user owns a file or folder and is the only one who may write it."""
+    """True if this user owns a file or folder and no other user can write it."""
     return status.st_uid == os.getuid() and not status.st_mode & 0o022
 
 
@@ -136,7 +136,7 @@ def forget_the_oldest(folder: Path, most: int) -> None:
 
 
 def user_folder(*names: str) -> Path | None:
-    """A folder below the user's cache directory that only this user can write; None where it cannot be made."""
+    """Folder in the user's cache directory that only this user can write; None if it cannot be made."""
     try:
         folder = _user_cache().absolute().joinpath(*names)
         for part in (*reversed(folder.parents), folder):  # `parents=True` would make those above by the umask
@@ -150,7 +150,7 @@ _MOST = 256 << 20  # bytes of all programs of one kind that are kept
 
 
 def program_folder(name: str) -> Path | None:
-    """Private folder of this name for compiled programs, limited in size; None where it cannot be made."""
+    """Private folder of limited size for compiled programs; None if it cannot be made."""
     folder = user_folder(__name__.partition(".")[0], name)
     if folder is None:
         return None
@@ -172,7 +172,7 @@ def _user_cache() -> Path:
 
 
 def _is_private(folder: Path) -> bool:
-    """Whether only this user can place files in a folder, and folders or links on the way: files may be executed."""
+    """True if only this user can place files in a folder and in its parents: the files may be executed."""
     if not os.access(folder, os.W_OK):
         return False
     if sys.platform == "win32":
@@ -181,7 +181,7 @@ def _is_private(folder: Path) -> bool:
 
 
 def _is_out_of_reach(folder: Path) -> bool:
-    """Whether only this user and the system can replace what a folder contains, or where a link leads."""
+    """True if only this user and the system can replace the content of a folder or the target of a link."""
     link, status = folder.lstat(), folder.stat()
     if {link.st_uid, status.st_uid} - {0, os.getuid()}:
         return False

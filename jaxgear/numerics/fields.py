@@ -27,11 +27,11 @@ _warned: set[tuple[str, str]] = set()  # classes and fields that were warned of:
 
 
 class Usual(NamedTuple):
-    """The usual range of a number, or of its size where it belongs to a field: then zero is usual too.
+    """Usual range of a number; for a number field, the range of its magnitude, where zero is usual too.
 
     Attributes:
         low, high: the range.
-        unit: of both; that of the field where it belongs to one.
+        unit: unit of the range; of a number field, the unit of the field.
         remark: what is likely meant by another number, or what such a number means; with its source.
     """
 
@@ -41,11 +41,11 @@ class Usual(NamedTuple):
     remark: str
 
     def holds(self, value: float) -> bool:
-        """Whether a number is in the range; NaN is not."""
+        """True if a number is in the range; False for NaN."""
         return self.low <= value <= self.high
 
     def missed_by(self, value: float) -> str:
-        """In which way a number is out of the range, and what it may mean."""
+        """Message on a number out of the range, with its probable cause."""
         low = value < self.low
         return f"{'less' if low else 'more'} than {self.text(self.low if low else self.high)} ({self.remark})"
 
@@ -55,7 +55,7 @@ class Usual(NamedTuple):
 
 
 class UnitKey(str):
-    """Name of a number with its unit, as files carry it (`ppte_um`), which knows its heading (`PPTE [um]`).
+    """Name of a number with its unit, for keys of files (`ppte_um`), and its heading (`PPTE [um]`).
 
     Attributes:
         name: without the unit.
@@ -133,7 +133,7 @@ class Limits(TypedDict, total=False):
 
 
 def number(unit: str, *, default: object = MISSING, kw_only: bool = False, **limits: Unpack[Limits]) -> Any:
-    """A field that holds a number or an array of numbers, a leaf that JAX can trace and differentiate.
+    """Field for a number or an array, a leaf that JAX can trace and differentiate.
 
     Args:
         unit: "" for a pure number.
@@ -150,7 +150,7 @@ def number(unit: str, *, default: object = MISSING, kw_only: bool = False, **lim
 def count(
     *, low: int = 1, high: int | None = None, optional: bool = False, default: object = MISSING, kw_only: bool = False
 ) -> Any:
-    """A static field that holds a whole number: a size, or how often something is done."""
+    """Static field for a whole number, such as a size or a number of repetitions."""
     most = _MOST if high is None else high
     return number("", default=default, kw_only=kw_only, low=low, high=most, optional=optional, whole=True, static=True)
 
@@ -161,13 +161,13 @@ def result(unit: str = "") -> Any:
 
 
 def fields_of(cls: type) -> dict[str, Number]:
-    """The number fields of a class: what may be given for each."""
+    """Number fields of a class, with their units and ranges."""
     return {field.name: field.metadata[_KEY] for field in dataclasses.fields(cls) if _KEY in field.metadata}
 
 
 @dataclass_transform(field_specifiers=(eqx.field, number, count, result))  # type checkers know their defaults
 class Checked(eqx.Module):
-    """A Module whose fields are checked when it is made, and which prints its numbers with their units.
+    """Module whose fields are checked on construction, and which prints its numbers with their units.
 
     Besides its number fields, choices (`Literal`), switches (`bool`) and Modules within it are checked against their
     annotation.
@@ -197,7 +197,7 @@ class Checked(eqx.Module):
 
 
 def changed(module: _Module, **fields: object) -> _Module:
-    """The Module with other fields, as JAX puts it together: nothing is converted or checked, and it takes no time."""
+    """Copy of a Module with other fields, without conversion and checks."""
     made = object.__new__(type(module))
     for field in dataclasses.fields(module):
         object.__setattr__(made, field.name, fields.get(field.name, getattr(module, field.name)))
@@ -241,7 +241,7 @@ def check(
 
 
 def whole(name: str, value: object, low: float = 1, high: float = _MOST) -> int:
-    """The value as an int; raises a one-line `ValueError` unless it is a whole number from `low` to `high`."""
+    """Value as an int; raises a one-line `ValueError` unless it is a whole number from `low` to `high`."""
     if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < low:
         raise ValueError(f"{name} = {value!r} must be a whole number of at least {low}")
     if value > high:
@@ -346,7 +346,7 @@ def _range(low, high, open_low, open_high, unit_text) -> str:
 
 
 def within_limits(module: PyTree[eqx.Module]) -> Bool[Array, ""]:
-    """Whether all numbers of a `Checked` Module and of those within it are finite and in the range of their fields.
+    """True if all numbers of a `Checked` Module and its parts are finite and in the ranges of their fields.
 
     Concrete numbers that are not are refused when the Module is made; traced ones, and numbers put into it later, pass
     there. Whether whole numbers are whole, and what fields have to be together, is not looked at.

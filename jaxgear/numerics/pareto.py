@@ -106,12 +106,12 @@ Strings = Bool[Array, "population length"]
 
 
 def random_strings(key: PRNGKeyArray, population: int, numbers: int, bits: int) -> Strings:
-    """A first population; each string holds so many numbers of so many bits, one after the other."""
+    """Random first population of bit strings, each with several numbers of several bits."""
     return jax.random.bernoulli(key, shape=(population, numbers * bits))
 
 
 def decoded(strings: Strings, bits: int) -> Float[Array, "population numbers"]:
-    """The numbers that strings stand for, 0 with all bits off to 1 with all bits on; the first bit counts most."""
+    """Numbers encoded by bit strings, from 0 (all bits off) to 1 (all bits on), most significant bit first."""
     worth = 2.0 ** np.arange(bits - 1, -1, -1) / (2.0**bits - 1)
     return jnp.sum(jnp.where(strings.reshape(len(strings), -1, bits), worth[None, None], 0.0), axis=-1)
 
@@ -153,7 +153,7 @@ def halton(dimensions: int, count: int, seed: int | None = None) -> np.ndarray:
 
 
 def _van_der_corput(count: int, base: int, rng: np.random.Generator | None) -> np.ndarray:
-    """Numbers whose digits after the point are those of 0, 1, 2, ... from the last one on, or permutations of them."""
+    """Van der Corput numbers: the reversed digits of 0, 1, 2, ..., optionally permuted, after the point."""
     digits = int(np.ceil(54 / np.log2(base))) - 1  # that a double can show
     permuted = np.repeat(np.arange(base)[None], digits, axis=0)
     if rng is not None:

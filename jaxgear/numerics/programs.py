@@ -72,7 +72,7 @@ def quick_jit(function: Callable[_Given, _Found], *, always: bool = True) -> Cal
 
 
 def _as_array(leaf: Any) -> Any:
-    """A Python or NumPy number as an array with the type that `jax.jit` gives it; everything else as it is."""
+    """Python or NumPy number as an array of the type that `jax.jit` gives it; other values unchanged."""
     return jnp.asarray(leaf) if type(leaf) in (int, float, complex) or isinstance(leaf, np.generic) else leaf
 
 
@@ -93,13 +93,13 @@ def _jitted(function: Callable[_Given, _Found], always: bool) -> Callable[_Given
 
 
 def _is_quick(always: bool) -> bool:
-    """Whether a function is compiled quickly, by what `quick_jit` was told of it."""
+    """True if a function is compiled quickly, by the option given to `quick_jit`."""
     return (always or _everything) and quick_options() is not None
 
 
 @functools.cache
 def quick_options() -> dict[str, Any] | None:
-    """Options for JAX's compiler, as far as its version knows them; None where the user has said how to compile."""
+    """Options for JAX's compiler that its version supports; None if the user has set compiler flags."""
     given = os.environ.get("XLA_FLAGS", "")
     if jax.default_backend() != "cpu" or any(option in given for option in OPTIONS):
         return None
@@ -107,7 +107,7 @@ def quick_options() -> dict[str, Any] | None:
 
 
 def supported_options(options: dict[str, Any]) -> dict[str, Any]:
-    """The given options without those that the compiler does not know: one of these would make it refuse programs."""
+    """Options that the compiler supports; it would refuse programs with an unsupported one."""
     if _compiles(options):
         return options
     return {name: value for name, value in options.items() if _compiles({name: value})}
@@ -122,13 +122,13 @@ def _compiles(options: dict[str, Any]) -> bool:
 
 
 def is_eager() -> bool:
-    """Whether nothing is being traced: JAX takes options for a program, not for a part of one."""
+    """True if nothing is being traced: compiler options apply to whole programs only."""
     return bool(get_opaque_trace_state() == _untraced())
 
 
 @functools.cache
 def _untraced():
-    """The state in which nothing is being traced: that of a new thread."""
+    """Trace state of a new thread, in which nothing is traced."""
     with ThreadPoolExecutor(1) as pool:
         return pool.submit(get_opaque_trace_state).result()
 
@@ -164,7 +164,7 @@ class Shelf(Protocol):
 
 
 class _Shape(NamedTuple):
-    """Stands for an array of which everything but the numbers is known."""
+    """Stand-in for an array with known shape and type but unknown numbers."""
 
     shape: tuple[int, ...]
     dtype: str
@@ -192,7 +192,7 @@ class _Program(NamedTuple):
 
 
 class ProgramStore:
-    """Programs by what they are made of, compiled in threads of their own.
+    """Compiled programs by their inputs and code; compiles in threads of its own.
 
     Args:
         shelf: where they lie between two processes.
@@ -331,7 +331,7 @@ def _is_extended(dtype) -> bool:
 
 
 def _is_left_to_jax(leaf) -> bool:
-    """Whether an argument is being traced, or of a type that no file holds, such as a key of random numbers."""
+    """True if an argument is traced or cannot be written to a file, such as a random key."""
     kind = _kind_of(leaf.__class__)
     return kind is _Kind.TRACED or (kind is _Kind.OF_JAX and _is_extended(leaf.dtype))
 
@@ -356,7 +356,7 @@ def _filled(tree: Any, arrays: Iterable[Any]) -> Any:
 
 
 def _lowered(function: Callable[..., Any], arguments: Any) -> tuple[jax.stages.Lowered, Any]:
-    """A function of arrays alone, ready to be compiled, and what it returns."""
+    """Function of arrays only, lowered for compilation, and the structure of its result."""
     shapes = [leaf.struct for leaf in jax.tree.leaves(arguments, is_leaf=_is_shape) if _is_shape(leaf)]
     results = []
 
@@ -381,12 +381,12 @@ def _packed(run, result: Any) -> bytes | None:
 
 @functools.cache
 def _register() -> None:
-    """Loads LAPACK, which JAX does while it lowers: a program that is only loaded would call nothing."""
+    """Register LAPACK kernels, which JAX does on lowering: a program loaded from a file would lack them."""
     jax.jit(jax.lax.linalg.lu).lower(jax.ShapeDtypeStruct((1, 1), "float32"))
 
 
 def _devices(arguments: Any) -> list[jax.Device]:
-    """On which a program for such arguments runs."""
+    """Devices on which a program for these arguments runs."""
     shapes = filter(_is_shape, jax.tree.leaves(arguments, is_leaf=_is_shape))
     shared = {shape.shared for shape in shapes} - {None}
     return jax.local_devices() if shared else jax.local_devices()[:1]
@@ -398,7 +398,7 @@ def _loaded(code: tuple[bytes, Any, Any], devices: list[jax.Device]) -> _Run:
 
 
 class _Recipe(pickle.Pickler):
-    """Writes what a program is made of, to be compared: functions by their names and what they enclose.
+    """Pickler of a comparable description of a program: functions by name and enclosed values.
 
     Equal objects are written alike, whether they are one object or two, which differs from process to process.
     """
@@ -421,7 +421,7 @@ class _Recipe(pickle.Pickler):
 
 
 def _recipe(made_of: Any) -> bytes | None:
-    """Description of what a program is made of, as bytes; None where it cannot be written."""
+    """Description of the code and inputs of a program as bytes; None if they cannot be written."""
     written = io.BytesIO()
     try:
         _Recipe(written).dump(made_of)

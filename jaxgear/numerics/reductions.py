@@ -100,18 +100,18 @@ Real = Float[Array, "..."]
 
 @dataclass(frozen=True)
 class AbstractReduction(ABC):
-    """A number that stands for the values along the last axis."""
+    """Reduction of the values along the last axis to one number."""
 
     @abstractmethod
     def __call__(self, values: Values) -> Real:
         """The exact number."""
 
     def soft(self, values: Values, width: Given) -> Real:
-        """The number with soft extremes of a width in the unit of the values; towards zero it becomes the exact one."""
+        """Reduction with soft extremes of a width in the unit of the values; exact in the limit of zero width."""
         return self(values)
 
     def factors(self, sign: int) -> tuple[float, float] | None:
-        """The factors (a, b) of the pieces of `sign` times the number; None where it is not made of pieces."""
+        """Factors (a, b) of the pieces of `sign` times the reduction; None if it is not piecewise linear."""
         return None
 
 

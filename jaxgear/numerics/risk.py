@@ -19,7 +19,7 @@ Edges = Float[Array, " edges"]
 
 
 class AbstractMeasure(Checked):
-    """A number that stands for many."""
+    """Measure that joins many values into one."""
 
     @abstractmethod
     def spread(self, share: Edges, count: Scalar) -> Edges:

@@ -58,7 +58,7 @@ _SQRT_HALF_BITS = 0x3FE6A09E667F3BCD  # of the float64 nearest to sqrt(1/2)
 
 @jax.custom_jvp
 def log(x: Real) -> Real:
-    """ln x, elementwise, of positive normal numbers; NaN for anything else, infinity included."""
+    """Natural logarithm of positive normal numbers, elementwise; NaN for other inputs, infinity included."""
     value = _log_float64(x) if x.dtype == jnp.float64 else jnp.log(x)
     return jnp.where((x > 0) & (x < jnp.inf), value, jnp.nan)
 
@@ -95,7 +95,7 @@ def _stored_jvp(primals, tangents):
 
 
 def unit(x: Given) -> Real:
-    """Ones of which a compiler does not know it; x where that is NaN."""
+    """Array of 1.0 that XLA cannot fold; NaN where x is NaN."""
     return jnp.where(x == x, 1.0, x)
 
 

@@ -51,7 +51,7 @@ def interpolate_columns(
 
 
 def cell(x: Float[Array, "..."], positions: Points) -> Int[Array, "..."]:
-    """Number of the interval between two positions that x lies in, that of the nearest end beyond them."""
+    """Number of the interval that contains x; the first or last one beyond the ends."""
     right = jnp.searchsorted(positions, jax.lax.stop_gradient(x), side="right", method="scan_unrolled")
     return jnp.clip(right - 1, 0, positions.shape[0] - 2)
 

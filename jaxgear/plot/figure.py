@@ -135,7 +135,7 @@ _LINE = 34  # letters along an axis of report height, about which a long label i
 
 
 def wrapped(text: str, room: int = _LINE) -> str:
-    """A label in lines of at most `room` letters where its words allow it, its unit with the last word."""
+    """Label broken into lines of at most `room` letters between words, with the unit in the last line."""
     bound = text.replace(" [", "\N{NO-BREAK SPACE}[")
     return textwrap.fill(bound, max(room, 1), break_long_words=False, break_on_hyphens=False)
 

@@ -178,7 +178,7 @@ def _lead_band(side: Side, design: AbstractModification, quality: ToleranceClass
 
 
 def _edges(abscissa: Array, lower: Array, upper: Array) -> Edges:
-    """A band as it is drawn, of material removed, over the evaluation range."""
+    """Band of material removed for drawing, over the evaluation range."""
     inside = np.isfinite(upper)
     return np.asarray(abscissa)[inside], -np.asarray(upper)[inside], -np.asarray(lower)[inside]
 

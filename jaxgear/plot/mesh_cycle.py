@@ -26,7 +26,7 @@ def middle_path(cycle: MeshCycle) -> np.ndarray:
 
 
 def _path_label(cycles: Iterable[MeshCycle]) -> str:
-    """Axis label of path positions, which are those at mid-face if any of the cycles is of helical gears."""
+    """Axis label of path positions; positions at mid-face if any cycle is of helical gears."""
     return PATH_LABEL.replace(" [", ", mid-face [") if any(cycle.kinematics.helical for cycle in cycles) else PATH_LABEL
 
 
@@ -52,7 +52,7 @@ def pair_history(cycle: MeshCycle, values: ArrayLike) -> tuple[np.ndarray, np.nd
 
 
 def _path_limits(cycles: Iterable[MeshCycle]) -> tuple[float, float]:
-    """Path range that holds the path of contact and all loaded contact of these cycles, with some air [mm]."""
+    """Path range of the path of contact and all loaded contact of these cycles, with a margin [mm]."""
     low, high = [], []
     for cycle in cycles:
         contact = cycle.kinematics.path_of_contact

@@ -43,7 +43,7 @@ def revolution(of: Mapping[str, Revolution], ax: Axes | None = None) -> Axes:
 def order_spectrum(
     found: Revolution, teeth: Teeth, ax: Axes | None = None, *, harmonics: int = 2, title: str = ""
 ) -> Axes:
-    """Amplitudes of the transmission error [um] over the order of the pinion, each line named by what it comes from.
+    """Amplitudes of the transmission error [um] over the order of the pinion, each line labelled by its cause.
 
     Args:
         found: revolution of one design.

@@ -37,7 +37,7 @@ class Record(Generic[Row]):
         return UnitKey(self.name, self.unit)
 
     def text(self, value: object) -> str:
-        """The number as tables show it."""
+        """Text of the number in tables."""
         return self.form(value) if callable(self.form) else format(value, self.form)
 
 

@@ -97,7 +97,7 @@ class Component:
         return DesignFileError(self.where(attribute), problem)
 
     def missing(self, attribute: str) -> DesignFileError:
-        """Error for a missing attribute, with the option that gives it."""
+        """Error for a missing attribute, with the option that supplies it."""
         key = self.keys.get(attribute)
         return self.refuse(attribute, f"missing, give it with --set {key}=VALUE" if key else "missing")
 
@@ -384,7 +384,7 @@ def written(value: object) -> str | tuple[str, ...]:
 
 
 def shifted(value: object, shift: int) -> str | tuple[str, ...]:
-    """Numbers times 10^shift as text; the shift is of the decimal digits, so that it is exact."""
+    """Numbers times 10^shift as text, exact because the decimal digits are shifted."""
     text = written(value)
     if isinstance(text, tuple):
         return tuple(_shift(item, shift) for item in text)

@@ -380,7 +380,7 @@ def _load(model: Model, stage: Component, pinion: Component, wanted: int | None)
 
 
 def _number_of_case(model: Model, case: dict[int, Component], ids: list[int], name: str, unit: str) -> float | None:
-    """Absolute value of a number of the first component that has it, in the load case or else outside of it."""
+    """Absolute value of a number of the first component that has it, in the load case or else outside it."""
     for number in ids:
         for part in (case.get(number), model.component(number)):
             value = None if part is None else part.number(name, unit)
