@@ -43,6 +43,6 @@ def _of_folders(group: str) -> Iterator[tuple[str, str]]:
 
 @functools.cache
 def _applications() -> tuple[dict[str, Any], ...]:
-    """What every `application.toml` of this package says."""
+    """Content of every `application.toml` of this package."""
     files = sorted(Path(__file__).parent.glob("*/application.toml"))
     return tuple(tomllib.loads(file.read_text(encoding="utf-8")) for file in files)

@@ -11,7 +11,6 @@ from ..numerics.reductions import Min as Min
 from ..numerics.reductions import Range as Range
 from ..numerics.reductions import Rms as Rms
 from ..numerics.reductions import Value as Value
-from .analysis import Analysis as Analysis
 from .excitation import Harmonics as Harmonics
 from .excitation import excited_by as excited_by
 from .excitation import force_excitation as force_excitation
@@ -61,6 +60,7 @@ from .mesh_quantities import summary as summary
 from .mesh_quantities import tilting_moments as tilting_moments
 from .mesh_quantities import total_contact_ratio as total_contact_ratio
 from .quantity import AbstractSettings as AbstractSettings
+from .quantity import Analysis as Analysis
 from .quantity import Quantity as Quantity
 from .quantity import Vocabulary as Vocabulary
 from .quantity import share_settings as share_settings

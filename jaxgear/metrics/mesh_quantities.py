@@ -1,4 +1,8 @@
-"""Quantities of this package, and a summary of a mesh cycle by the most important ones."""
+"""Quantities of this package, and a summary of a mesh cycle by the most important ones.
+
+References:
+    For contact lines: ISO 21771 (ratios), ISO 6336-2 and G. Niemann, H. Winter, Maschinenelemente II (lengths).
+"""
 
 from collections.abc import Iterator
 from functools import partial

@@ -12,7 +12,6 @@ from jaxtyping import Array, Float
 
 from ..contact import MeshCycle
 from ..numerics.reductions import Max, Min
-from .analysis import Analysis
 from .lubricant import Lubricant
 from .lubrication import (
     bulk_temperature,
@@ -25,7 +24,7 @@ from .lubrication import (
     mesh_efficiency,
     specific_film_thickness,
 )
-from .quantity import Quantity
+from .quantity import Analysis, Quantity
 from .safety import (
     Strength,
     local_root_safety,

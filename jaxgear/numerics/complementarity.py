@@ -39,8 +39,20 @@ from .contact_problem import (
     secants_under,
     slopes_under,
 )
-from .coupling import CoupledFactors, couple, pressed_by, stiffness, with_inverse
-from .elimination import Active, Curve, Inverse, Load, Rows, Slopes, inverse_of
+from .coupling import (
+    Active,
+    CoupledFactors,
+    Curve,
+    Inverse,
+    Load,
+    Rows,
+    Slopes,
+    couple,
+    inverse_of,
+    pressed_by,
+    stiffness,
+    with_inverse,
+)
 from .implicit import jvp_of_given
 from .safe import unit
 

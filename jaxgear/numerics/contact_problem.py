@@ -13,8 +13,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
-from .coupling import SliceCoupling
-from .elimination import Rows, Slopes
+from .coupling import Rows, SliceCoupling, Slopes
 
 Real = Float[Array, "..."]
 

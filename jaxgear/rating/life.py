@@ -24,7 +24,7 @@ _BISECTIONS = 60
 
 
 class Strengths(NamedTuple):
-    """What both gears of a pair bear in one way to fail, pinion first.
+    """Strengths of pinion and wheel against one kind of failure.
 
     Attributes:
         limits: sigma_Hlim or sigma_Flim, endurance limits of the materials [MPa].

@@ -7,9 +7,6 @@ shafts with sections, bearings, gears, couplings -> Gearbox with meshes and hous
 """
 
 from ..contact.support import AbstractSupport as AbstractSupport
-from .bearing import AbstractBearing as AbstractBearing
-from .bearing import Bearing as Bearing
-from .bearing import MatrixBearing as MatrixBearing
 from .face_load import FaceLoad as FaceLoad
 from .face_load import annex_e as annex_e
 from .face_load import face_load_factor as face_load_factor
@@ -35,7 +32,10 @@ from .reactions import BearingReactions as BearingReactions
 from .reactions import ElasticLine as ElasticLine
 from .reactions import bearing_reactions as bearing_reactions
 from .reactions import elastic_line as elastic_line
+from .shaft import AbstractBearing as AbstractBearing
+from .shaft import Bearing as Bearing
 from .shaft import Coupling as Coupling
+from .shaft import MatrixBearing as MatrixBearing
 from .shaft import MountedGear as MountedGear
 from .shaft import Section as Section
 from .shaft import Shaft as Shaft

@@ -10,9 +10,8 @@ from ..contact.support import AbstractSupport
 from ..geometry import GearPair, margins
 from ..numerics import Given, concrete, number, program, real, whole, within_limits
 from .gearbox import Gearbox
-from .loads import acting, load_pattern, mesh_patterns, side_by_side, solve, torques_on
+from .loads import acting, load_pattern, mesh_patterns, side_by_side, solve, system_under_load, torques_on
 from .misalignment import Misalignment
-from .operating_point import system_under_load
 from .stepped_beam import ROUNDING, check_symmetric, semidefinite, symmetric, twist
 
 Slices = Float[Array, " slices"]

@@ -8,8 +8,7 @@ from jaxtyping import Array, Float
 from ..contact.status import Status
 from ..numerics import Checked, Numbers, check, concrete, program, real, result
 from .gearbox import Gearbox
-from .loads import Patterns, load_pattern, side_by_side, solve, torques_on
-from .operating_point import system_under_load
+from .loads import Patterns, load_pattern, side_by_side, solve, system_under_load, torques_on
 from .stepped_beam import DIRECTIONS, twist
 
 _WAYS = len(DIRECTIONS)
