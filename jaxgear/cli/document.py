@@ -38,7 +38,7 @@ _EVEN = "One slice represents the whole face: the load is even over it."
 
 @dataclass(frozen=True)
 class Document:
-    """A report that was asked for.
+    """Report of a command, requested by its options.
 
     Attributes:
         command: the command line, from its name to the last option.

@@ -32,7 +32,7 @@ def entry(kind: ValueType, default: Any = None) -> Any:
 
 
 class FileTable:
-    """A table of the file: the attributes that `entry` declares are the allowed keys.
+    """Table of a design file: attributes declared by `entry` are the allowed keys.
 
     Attributes:
         keys: by their names.
@@ -110,12 +110,12 @@ def decode(key: str, data: object, section: type[S]) -> S:
 
 
 def nested(cls: type[Any], *, open: bool = True) -> ValueType:
-    """A table with the keys of a class, within another one.
+    """Value type of a table within another table, with the keys of a class.
 
-    Of an abstract class its `type` says which class derived from it is meant, or its name alone where that says all.
+    For an abstract class the key `type` names the derived class; the name alone is a table without further keys.
 
     Args:
-        cls: class of a table, which is read as an object of it, or of the library, which is read as a `Template`.
+        cls: subclass of `FileTable`, read as an object of it, or class of the library, read as a `Template`.
         open: the names of variables may stand for numbers of a class of the library.
     """
     if issubclass(cls, FileTable):

@@ -171,7 +171,7 @@ class Range(AbstractReduction):
 
 @dataclass(frozen=True)
 class Average(AbstractReduction):
-    """The mean."""
+    """Mean of the values."""
 
     def __call__(self, values: Values) -> Real:
         return jnp.mean(values, axis=-1)

@@ -63,7 +63,7 @@ class Limit(Checked):
         return f"{self.value:.4g} {self.unit}".rstrip() + f", {state}: {' and '.join(limits)}"
 
     def summary(self) -> dict[str, Any]:
-        """Values as plain data, for a table or a file."""
+        """Values as plain data for tables and files."""
         return {"value": self.value, "low": self.low, "high": self.high, "unit": self.unit, "met": self.kept}
 
 

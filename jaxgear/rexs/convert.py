@@ -30,7 +30,7 @@ def convert(
     torque: float | None,
     given: Iterable[str],
 ) -> None:
-    """Convert a file into the format that the end of the target's name says; an existing file is never replaced.
+    """Convert a file into the format given by the suffix of the target; an existing file is never replaced.
 
     Without a target it prints the stages of a REXS file.
     """

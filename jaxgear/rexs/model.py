@@ -367,7 +367,7 @@ def _checked_version(version: str) -> str:
 
 
 def whole(text: object, where: str) -> int:
-    """Whole number, for instance an id; raises for another text."""
+    """Whole number of a text, for instance an id; raises for other text."""
     if not isinstance(text, str) or not re.fullmatch(r"\s*[+-]?\d{1,9}\s*", text, re.ASCII):
         raise DesignFileError(where, f'"{str(text)[:40]}" is not a whole number')
     return int(text)

@@ -301,7 +301,7 @@ def _fill(evaluator: Evaluator, plan: AbstractPlan, store: Store, callback: Call
 
 
 def _run(evaluator: Evaluator, plan: AbstractPlan, store: Store, parts: dict[int, bool], keep, callback) -> None:
-    """Evaluate parts and pass them to `keep(part, columns)` in order; `parts` gives for each whether it is missing."""
+    """Evaluate the parts and pass each to `keep(part, columns)` in order; `parts` is True for missing parts."""
     rows = {part: store.span(part)[1] - store.span(part)[0] for part in parts}
     done, total = sum(rows[part] for part in parts if not parts[part]), sum(rows.values())
     report = callback or (lambda done, total, best: None)

@@ -252,7 +252,7 @@ def _between(place: Points, low: Scalar, high: Scalar) -> Bool[Array, " points"]
 
 
 def _band(values: Points, inside: Marks, counted: Marks) -> Scalar:
-    """Largest value of those counted, which include the ones inside, less the least of those inside."""
+    """Range of values: the largest among `counted` points minus the smallest among `inside` points."""
     first = values[jnp.argmax(inside)]
     return maximum(jnp.where(counted, values, first)) - minimum(jnp.where(inside, values, first))
 
