@@ -37,6 +37,8 @@ def public_names(package: str) -> list[str]:
     Each as `module.name`: a module and its function may be called alike.
     """
     folder = PACKAGE.joinpath(*package.split("."))
+    if not folder.exists():  # a single module
+        return sorted(name for name in _defined(folder) if not name.startswith("_"))
     init = next(path for path in (folder / "__init__.pyi", folder / "__init__.py") if path.exists())
     found = []
     for node in ast.parse(init.read_text("utf-8")).body:

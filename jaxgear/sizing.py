@@ -5,7 +5,8 @@ from typing import Literal
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from .compliance import iso_stiffness
+from .compliance import IsoStiffness as IsoStiffness
+from .compliance import iso_stiffness as iso_stiffness
 from .compliance.iso_6336 import single_stiffness
 from .contact import MeshCycle
 from .geometry import GearPair, PathOfContact, path_of_contact
