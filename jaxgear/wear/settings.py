@@ -131,7 +131,7 @@ def _at_most(longest, history):
     return jnp.where(history > longest, longest, history)
 
 
-def _pressure_error(history: WearHistory):
+def _pressure_error(history: WearHistory) -> Float[Array, ""]:
     """Estimated error of the largest pressure over a wear history [MPa]; tip corners have no grid error."""
     largest = over_life(history, "max_contact_pressure")
     may_be = jnp.maximum(largest, over_life(history, "max_flank_pressure") + pressure_error(history))
