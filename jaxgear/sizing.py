@@ -42,7 +42,7 @@ def relief_amount(pair: GearPair, torque: Given, application_factor: Given = 1.0
 
     Args:
         pair: gear pair.
-        torque: on the pinion [N m].
+        torque: torque on the pinion [N m].
         application_factor: K_A.
     """
     line_load = _line_load(pair, torque, application_factor)
@@ -59,7 +59,7 @@ def effective_relief(
 
     Args:
         pair: gear pair.
-        torque: on the pinion [N m].
+        torque: torque on the pinion [N m].
         application_factor: K_A.
         mesh_load_factor: K_mp, uneven sharing between several meshes.
     """
@@ -79,7 +79,7 @@ def mesh_stiffness_relief(pair: GearPair, torque: Given, application_factor: Giv
 
     Args:
         pair: gear pair.
-        torque: on the pinion [N m].
+        torque: torque on the pinion [N m].
         application_factor: K_A.
     """
     line_load = _line_load(pair, torque, application_factor)
@@ -167,7 +167,7 @@ def crowning_for_misalignment(misalignment: Given, *, limited: bool = False) -> 
 
     Args:
         misalignment: F_betax [um over the face width], for example `equivalent_misalignment`.
-        limited: whether to keep to the range of the annex, 10 to 40 um.
+        limited: True for amounts limited to the range of the annex, 10 to 40 um.
     """
     check("misalignment", misalignment, "um", low=0.0)
     amount = 0.5 * real(misalignment)
@@ -182,7 +182,7 @@ def crowning_for_tolerance(helix_tolerance: Given, *, limited: bool = False) -> 
 
     Args:
         helix_tolerance: f_Hbeta, helix slope tolerance [um].
-        limited: whether to keep to the range of the annex, 10 to 25 um.
+        limited: True for amounts limited to the range of the annex, 10 to 25 um.
     """
     check("helix_tolerance", helix_tolerance, "um", low=0.0)
     amount = real(helix_tolerance)

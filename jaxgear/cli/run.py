@@ -80,8 +80,8 @@ def run_study(
         options: arguments of `of.of` besides the design file.
         file: the design file.
         output: result folder; None for that of the study.
-        figures: whether figures are drawn.
-        cache: whether compiled programs are kept on disk.
+        figures: True if figures are drawn.
+        cache: True if compiled programs are kept on disk.
         command: the command line, where a report is written.
     """
     asked = document(command, file, *of.report_needs)

@@ -44,9 +44,9 @@ class LoadSpectrum(Checked):
         """Makes the spectrum.
 
         Args:
-            torques: on the pinion [N m], all different unless they have speeds.
-            weights: of any sum; None for equal shares.
-            speeds: of the pinion [rpm], one per torque or one for all; None for none.
+            torques: torques on the pinion [N m], all different unless they have speeds.
+            weights: shares of the torques, of any sum; None for equal shares.
+            speeds: speeds of the pinion [rpm], one per torque or one for all; None for none.
             friction: mean coefficient of friction; None for the default of each quantity.
             duration: total duration of all loads [h], of which the weights are shares; None for none.
 
@@ -93,7 +93,7 @@ class LoadSpectrum(Checked):
 
         Args:
             torques, speeds, friction: as for the class.
-            hours: at every torque [h].
+            hours: hours at every torque [h].
 
         Raises:
             ValueError: as the class does, and for hours that are all zero.

@@ -137,8 +137,8 @@ def variants(
 
     Args:
         mesh: prepared mesh, or a function of the named variables that prepares one; traced.
-        torque: on the pinion [N m], an `OperatingPoint` or a `LoadSpectrum`; or a function of the named variables that
-            gives a torque or an operating point.
+        torque: torque on the pinion [N m], an `OperatingPoint` or a `LoadSpectrum`; or a function of the named
+            variables that gives a torque or an operating point.
         design: makes (pinion, wheel) modifications from the named variables.
         names: names of the variables.
         values: example values of the variables, with which the functions are checked.
@@ -168,7 +168,7 @@ def call_with(name: str, function: Callable[[Parameters], Result], parameters: P
     """Call a function of the named variables.
 
     Args:
-        name: of the function, for messages.
+        name: name of the function, for messages.
         function: traceable.
         parameters: values by the names of the variables.
 

@@ -49,7 +49,7 @@ class PolynomialClearance(AbstractMeshForce):
 
         Args:
             order: 3, 5 or 7.
-            range: in half clearances, more than 1; the coefficients depend strongly on it.
+            range: fitted range in half clearances, more than 1; the coefficients depend strongly on it.
         """
         if order not in ORDERS:
             raise ValueError(f"PolynomialClearance.fit: order = {order!r} must be 3, 5 or 7")

@@ -234,8 +234,8 @@ def rectangular_harmonics(ratio: Given, share: Given, count: int = 5) -> Float[A
 
     Args:
         ratio: stiffness with two pairs over that with one.
-        share: of the cycle with two pairs, contact ratio - 1.
-        count: of harmonics.
+        share: share of the cycle with two pairs, contact ratio - 1.
+        count: number of harmonics.
     """
     check("ratio", ratio, "", low=0.0, open_low=True)
     check("share", share, "", low=0.0, high=1.0)

@@ -136,7 +136,7 @@ class Dynamics(AbstractSettings):
 
         Args:
             mesh: prepared mesh.
-            torque: on the pinion [N m].
+            torque: torque on the pinion [N m].
             pinion: modification of the pinion flank; None for the nominal involute.
             wheel: modification of the wheel flank; None for the nominal involute.
 

@@ -168,7 +168,7 @@ class _Problem(eqx.Module):
     """Unknowns of a fit and the model that depends on them.
 
     Attributes:
-        names: of the unknowns.
+        names: names of the unknowns.
         own: number of unknowns, the first ones, that are not pitch deviations.
         turn: matrix from independent unknowns to all, both in prior deviations; of the pitch deviations of a gear one
             less is independent than there are teeth.

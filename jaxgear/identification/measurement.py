@@ -190,9 +190,9 @@ class Errors(NamedTuple):
     """Noise and error of the model, as independent shapes and what is outside of them.
 
     Attributes:
-        noise: of the readings.
-        shapes: of readings in noises, orthonormal columns.
-        variance: of the error of the model in every one, where its shapes have unit size.
+        noise: noise of the readings.
+        shapes: shapes of readings in noises, orthonormal columns.
+        variance: variance of the error of the model in every one, where its shapes have unit size.
     """
 
     noise: Rows

@@ -74,8 +74,8 @@ class FileSection(FileTable):
         wheel: the driven gear.
         load: torque and speed.
         title: free text; the name of the file without it.
-        materials: of gears and shafts, by name; "STEEL" is built in.
-        pair: how the gears are mounted.
+        materials: materials of gears and shafts, by name; "STEEL" is built in.
+        pair: centre distance and mounting of the gears.
         model: stiffness model; the default model without it.
         misalignment: deviation of the axes; parallel ones without it.
         resolution: array sizes; the defaults without it.
@@ -111,7 +111,7 @@ class FileDesign(eqx.Module):
     """The flanks of a design file as a function of its free parameters; pure and traceable.
 
     Attributes:
-        names: of the parameters.
+        names: names of the parameters.
         pinion, wheel: the modifications, which are added up.
     """
 
@@ -182,16 +182,16 @@ class DesignFile:
         text: the whole file as it was read, as one text.
         title: free text, the file's stem if it has none.
         torque: amount of the design torque on the pinion [N m]; the middle of its bounds where it is a variable.
-        coast: whether the torque is negative: mesh and modifications are those of the coast flanks, see
+        coast: True if the torque is negative: mesh and modifications are those of the coast flanks, see
             `GearPair.coast`, while `pair` has the gears of the file.
         torque_range: lowest and highest torque of interest [N m].
-        speed: of the pinion [rpm], None if the file names none; the middle of its bounds where it is a variable.
+        speed: speed of the pinion [rpm], None if the file names none; the middle of its bounds where it is a variable.
         friction: mean coefficient of friction; None for the library's default.
         quality_classes: flank tolerance classes of pinion and wheel, of the gears or of [tolerance]; None without.
-        drawn: of pinion and wheel, what the file gives as name of the material and as measures of the tooth thickness.
+        drawn: name of the material and measured tooth thickness of pinion and wheel, as given in the file.
         bounds: (low, high) of every free parameter, in its unit.
         units: unit of every free parameter, "" for a pure number.
-        values: of the free parameters that name one, which `jaxgear analyze` takes.
+        values: values of the free parameters that name one, which `jaxgear analyze` takes.
         open_case: numbers of gears, pair, model, misalignment and load that are variables; a sweep alone can vary them.
         design: makes the modifications of pinion and wheel from the free parameters.
         support: the mesh on its shafts; None without them.

@@ -55,10 +55,10 @@ class FlankRange:
         """Raise unless the range lies on the flank of a gear.
 
         Args:
-            gear: of concrete numbers.
-            start_roll_length: at the start of its active profile [mm].
+            gear: gear of concrete numbers.
+            start_roll_length: roll length at the start of the active profile [mm].
             common_width: over which its face and the mate's overlap [mm].
-            common_middle: of that from the middle of the gear's face [mm].
+            common_middle: middle of the common face from the middle of the gear's face [mm].
 
         Raises:
             DesignFileError: in one line.
@@ -155,13 +155,13 @@ def read_flank(
     Args:
         path: text in UTF-8 with a line of headings, columns apart by commas, or by semicolons or tabs and then with
             decimal points or commas; or a Parquet file, whose name ends in .parquet.
-        gear: of a file with flanks of both gears, "pinion" or "wheel".
-        design: of a file with several designs.
+        gear: gear, for a file with flanks of both gears, "pinion" or "wheel".
+        design: name of the design, for a file with several designs.
         side: the gear's side of the contact, of `mesh.sides`: a table that is not on its flank is refused. It may reach
             5 % of active profile and face over their ends, and leave out 20 % at each. None takes any table.
-        revolutions: of the pinion, of a file with worn flanks after several numbers of them.
-        base_radius: of the gear [mm], for files without roll lengths where no side is given.
-        method: of interpolation along the profile.
+        revolutions: revolutions of the pinion, for a file with worn flanks after several numbers of revolutions.
+        base_radius: base radius of the gear [mm], for files without roll lengths where no side is given.
+        method: method of interpolation along the profile.
 
     Raises:
         ValueError: for a base radius that is not positive, or beside a side.
@@ -184,10 +184,10 @@ class FlankFileSection(FileTable):
 
     Attributes:
         file: CSV or Parquet file, beside the design file.
-        gear: of a file with flanks of both gears; the one that the table stands at where the key is left out.
-        design: of a file with several designs.
-        revolutions: of the pinion, of a file with worn flanks after several numbers of them.
-        method: of interpolation along the profile.
+        gear: gear, for a file with flanks of both gears; the one that the table stands at where the key is left out.
+        design: name of the design, for a file with several designs.
+        revolutions: revolutions of the pinion, for a file with worn flanks after several numbers of revolutions.
+        method: method of interpolation along the profile.
     """
 
     file: str = entry(text(), ...)
@@ -202,8 +202,8 @@ def flank_template(section: FlankFileSection, folder: Path, base_radius: float |
 
     Args:
         section: the table.
-        folder: of the design file.
-        base_radius: of the gear [mm]; None where variables decide it, the file then needs roll lengths.
+        folder: folder of the design file.
+        base_radius: base radius of the gear [mm]; None where variables decide it, the file then needs roll lengths.
     """
     path = folder / section.file
     with referring(f"{section.key}.file", path.name):
@@ -241,8 +241,8 @@ class _FromFile:
     """Maker of a template whose flank comes from a file: returns the flank unchanged.
 
     Attributes:
-        name: of the file.
-        reach: of its table.
+        name: name of the file.
+        reach: range of the table.
     """
 
     name: str

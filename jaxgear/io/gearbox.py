@@ -49,8 +49,8 @@ class _MountedGearSection(section_of(MountedGear, ("name", "gear"), open=False))
 
     Attributes:
         name: "pinion" or "wheel" for those of the file, another name for another gear.
-        gear: of another name, the keys of [pinion]; its modifications have no part in a layout.
-        integral: whether it is cut into the shaft, which its teeth stiffen; in place of `body_diameter`.
+        gear: keys of [pinion] for a gear with another name; its modifications have no part in a layout.
+        integral: True if the gear is cut into the shaft, which its teeth stiffen; in place of `body_diameter`.
     """
 
     name: str = entry(text(), ...)
@@ -62,14 +62,16 @@ class ShaftSection(FileTable):
     """A stepped shaft with what sits on it.
 
     Attributes:
-        name: of the shaft.
-        sections: from left to right, each with `length`, `diameter` and `bore`.
+        name: name of the shaft.
+        sections: sections from left to right, each with `length`, `diameter` and `bore`.
         bearings: each with `name`, `position`, `radial`, `axial`, `tilting` and `clearance`, or with `stiffness`, a
             matrix of 5 x 5 numbers, in place of all but the first two.
-        gears: on the shaft.
-        couplings: where torque enters and leaves, each with `position` and `torque`; one of a gearbox has no torque.
-        loads: from outside, each with `position`, `force` and `moment`.
-        material: of the shaft and what stiffens it, name in [materials] or elastic constants; "STEEL" without it.
+        gears: gears on the shaft.
+        couplings: couplings where torque enters or leaves, each with `position` and `torque`; one of a gearbox has no
+            torque.
+        loads: loads from outside, each with `position`, `force` and `moment`.
+        material: material of the shaft and what stiffens it, name in [materials] or elastic constants; "STEEL" without
+            it.
     """
 
     name: str = entry(text(), ...)
@@ -87,7 +89,7 @@ class MeshSection(section_of(GearMesh, ("pinion", "wheel", "misalignment"), open
     Attributes:
         pinion: the driving one.
         wheel: the driven one.
-        misalignment: of their axes, with `skew`, `inclination`, `bearing_span` and `direct`.
+        misalignment: misalignment of their axes, with `skew`, `inclination`, `bearing_span` and `direct`.
     """
 
     pinion: str = entry(text(), ...)
@@ -169,12 +171,12 @@ def support_of(
     """The mesh of pinion and wheel on its shafts.
 
     Args:
-        pair: of the file.
+        pair: pair of the file.
         shafts, meshes, housing: the tables of these names.
         direction: sense of rotation of the first shaft, seen against z, after the key that gives it.
-        torque: of the file, on the pinion [N m].
-        folder: of the design file.
-        materials: of the file.
+        torque: torque of the file, on the pinion [N m].
+        folder: folder of the design file.
+        materials: materials of the file.
 
     Raises:
         DesignFileError: for tables that do not make a gearbox with pinion and wheel in it, or whose couplings bring

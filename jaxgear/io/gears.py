@@ -217,8 +217,8 @@ def longest_path(pair: GearPair, part: Template, bounds: Mapping[str, tuple[floa
     """Pair with the values of its free numbers that give the largest overlap ratio.
 
     Args:
-        pair: with all variables in the middle of their bounds.
-        part: the same with its free numbers.
+        pair: pair with all variables in the middle of their bounds.
+        part: template of the pair, with its free numbers.
         bounds: (low, high) of every free parameter.
     """
     made = {}

@@ -50,8 +50,8 @@ def metric(
     """Table with metric numbers in place of imperial ones, and the imperial key of every converted key.
 
     Args:
-        key: of the table.
-        data: what the file says.
+        key: key of the table.
+        data: content of the table in the file.
         units: number of every key of the table; None for what is no number.
 
     Raises:

@@ -23,7 +23,7 @@ class ModelSection(section_of(Compliance)):  # type: ignore[misc]
         structure: "finite_element" takes tooth and body from finite elements, made once per gear and then kept; `plane`
             and the tables are its only other keys.
         pinion_table: CSV file, beside the design file, with the table of another finite-element program in place of it.
-        wheel_table: the same for the wheel.
+        wheel_table: CSV file with the table of the wheel.
     """
 
     preset: str = entry(choice("default", "legacy"), "default")
@@ -102,9 +102,9 @@ def with_tables(
     """The model, with the tables of the gears where the file asks for finite elements.
 
     Args:
-        model: what `model_template` made.
-        section: what the file says.
-        folder: of the design file, in which paths begin.
+        model: model from `model_template`.
+        section: table [model] of the file.
+        folder: folder of the design file, in which paths begin.
         pair: gears whose numbers may be variables.
         middle: the gears with all variables in the middle of their bounds.
     """

@@ -119,8 +119,8 @@ class _RoundingSection(FileTable):
     """Steps in which the result is wanted, such as a shop can make; 0 for all digits.
 
     Attributes:
-        amount: of the variables in um.
-        length: of the variables in mm.
+        amount: step of the variables in um.
+        length: step of the variables in mm.
         variables: steps of single variables by their names, each in the unit of its variable.
     """
 
@@ -136,15 +136,15 @@ class OptimizeSection(FurtherTable):
         method: name of the method; "slp" without it.
         objective: a quantity to be made small, or large where that is better; several for "pareto"; "ppte" without it.
         measure: joins the cases of several torques or manufactured gears into one number; "mean" without it.
-        level: of the measures "quantile" and "cvar".
-        torques: on the pinion; the design torque alone without it.
-        weights: of the torques.
+        level: level of the measures "quantile" and "cvar".
+        torques: torques on the pinion; the design torque alone without it.
+        weights: weights of the torques.
         manufactured: pairs of manufactured gears under every torque; needs [tolerance].
-        seed: of random searches and of the manufactured gears.
+        seed: seed of random searches and of the manufactured gears.
         starts: searches, of methods "slp", "adam" and "lbfgs".
         steps: most steps of every search, of the same methods; the result is in those of [optimize.rounding].
         application_factor: K_A of the rule-based relief.
-        verify: whether the designs are evaluated with the finite-element structure too; without it they are where the
+        verify: True if the designs are evaluated with the finite-element structure too; without it they are where the
             gears can be meshed. A quick run never does.
         rounding: steps of the variables in which the search ends.
         constraint: limits of quantities or of combinations of variables.
@@ -281,7 +281,7 @@ class Search:
 
     Attributes:
         design: the design file.
-        method: its name.
+        method: name of the method.
         problem: arguments of `Problem` besides the mesh.
         options: arguments of `minimize` or `pareto` besides problem and callback.
         curve: named curve on which the flanks of a method without parameters are projected; None for the others.

@@ -46,8 +46,8 @@ def write_traces(path: str | Path, traces: Sequence[Trace], measured: Sequence[T
 
     Args:
         path: file to write.
-        traces: of one flank, of `profile_trace` and `helix_trace`.
-        measured: of the same places, trace by trace; None for the design alone.
+        traces: traces of one flank, of `profile_trace` and `helix_trace`.
+        measured: measured of the same places, trace by trace; None for the design alone.
 
     Returns:
         the path.

@@ -115,7 +115,7 @@ def read_variants(
     Args:
         path: a .parquet file, or a CSV file in UTF-8 whose headings are the names, with or without a unit in brackets.
         bounds: (low, high) of every parameter.
-        units: of the parameters; lengths in another unit are converted, anything else in another unit is refused.
+        units: units of the parameters; lengths in another unit are converted, anything else in another unit is refused.
 
     Raises:
         DesignFileError: when the file cannot be read, lacks a parameter or has it twice, or holds something else than

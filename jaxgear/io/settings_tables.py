@@ -25,7 +25,7 @@ class DynamicsSection(FurtherTable, section_of(Dynamics, ("mesh_frequencies",), 
     Attributes:
         mesh_frequencies: lowest and highest frequency of the mesh; either these or `speeds`.
         speeds: lowest and highest speed of the pinion.
-        number: of speeds, at equal steps.
+        number: number of speeds, at equal steps.
         torque_factors: torques of `jaxgear dynamics`, in design torques; 0.5, 1 and 2 without it.
         run_up: duration of a change of speed from the lowest to the highest in `jaxgear dynamics`, at constant
             acceleration; no run-up without it.
@@ -57,7 +57,7 @@ class DynamicsSection(FurtherTable, section_of(Dynamics, ("mesh_frequencies",), 
 
         Args:
             design: the design file.
-            number: of speeds; None for that of the table.
+            number: number of speeds; None for that of the table.
 
         Raises:
             DesignFileError: for speeds that are no range, and a run-up of less than a mesh cycle for every sample.
@@ -107,9 +107,9 @@ class WearSection(FurtherTable, section_of(Wear, ("dynamics", "loads"), open=Fal
             [dynamics] and load.speed.
         largest_increment: wear depth per block of `jaxgear wear`, exceeded by at most a tenth; blocks of equal length
             without it. Quantities and the search over the life take `blocks` in any case.
-        torques: on the pinion, of a load spectrum that wears one flank; the load of the file without it.
+        torques: torques on the pinion, of a load spectrum that wears one flank; the load of the file without it.
         weights: shares of the revolutions at every torque; equal shares without it.
-        speeds: of the pinion at every torque; that of the file without it.
+        speeds: speeds of the pinion at every torque; that of the file without it.
     """
 
     table = "wear"

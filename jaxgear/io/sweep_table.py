@@ -40,13 +40,13 @@ class SweepSection(FurtherTable):
     """Variants to be evaluated by `jaxgear sweep`.
 
     Attributes:
-        sampling: how they are spread over the bounds of the variables.
+        sampling: distribution of the variants over the bounds of the variables.
         samples: number of variants, of "sobol" and "latin_hypercube".
-        seed: of the same.
+        seed: seed of "sobol" and "latin_hypercube".
         levels: values per variable, of "full_factorial": one number, or a number or list of values per variable.
         file: CSV or Parquet file of the variants, of "list".
-        torques: on the pinion; the design torque alone without it.
-        weights: of the torques.
+        torques: torques on the pinion; the design torque alone without it.
+        weights: weights of the torques.
         results: quantities to be listed.
         part_rows: variants per file of the table; without it there are about 64 files.
     """

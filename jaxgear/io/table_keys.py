@@ -35,10 +35,10 @@ class FileTable:
     """Table of a design file: attributes declared by `entry` are the allowed keys.
 
     Attributes:
-        keys: by their names.
+        keys: value types of the keys by name.
         source: class of the library, or function, whose fields they are in part; None for none.
-        table: its name where it is one of the top level and its class says so; "" for another.
-        key: its dotted key in the file, "" for the top level.
+        table: name of a top-level table; "" for other tables.
+        key: dotted key of the table in the file, "" for the top level.
         fields: values of the keys that the file sets, in the order of the class.
         written: imperial keys that the file has in place of those of the table, by these.
     """
@@ -201,7 +201,7 @@ def family(base: type[eqx.Module], *, users: bool = True) -> dict[str, type[eqx.
 
     Args:
         base: the abstract class.
-        users: with those that are defined outside the library.
+        users: users with those that are defined outside the library.
     """
     classes = [cls for cls in descendants(base) if _writable(cls)]
     layer = base.__module__.rpartition(".")[0]  # what another layer derives is a part of it, no choice of the user

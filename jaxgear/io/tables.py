@@ -44,7 +44,7 @@ class LoadSection(section_of(OperatingPoint)):  # type: ignore[misc]
             optimize and sweep then take in place of the drive flanks, with the `coast_modification` of the gears where
             they have one; all other torques of the file are amounts.
         torque_range: lowest and highest torque of interest; half and twice the design torque without it.
-        speed: of the pinion, for temperatures, film and loss.
+        speed: speed of the pinion, for temperatures, film and loss.
         friction: mean coefficient of friction, for efficiency and, with a speed, loss and temperatures; in place of the
             law of [lubricant].
     """
@@ -98,7 +98,7 @@ class FurtherTable(FileTable):
 
         Args:
             design: the `DesignFile`.
-            cycle: of a design with its flanks, under the design torque.
+            cycle: cycle of a design with its flanks, under the design torque.
         """
         return ()
 
@@ -107,8 +107,8 @@ class FurtherTable(FileTable):
 
         Args:
             design: the `DesignFile`.
-            name: of the design that the result is about.
-            cycle: of that design with its flanks, under the design torque.
+            name: name of the design that the result is about.
+            cycle: cycle of the design with its flanks, under the design torque.
         """
         return None
 
@@ -117,8 +117,8 @@ class FurtherTable(FileTable):
 
         Args:
             design: the `DesignFile`, which has what the quantity needs.
-            key: where its name stands.
-            quantity: of the vocabulary.
+            key: key that names the quantity.
+            quantity: quantity of the vocabulary.
 
         Raises:
             DesignFileError: where the table does not say all that the quantity needs; by default nothing.
@@ -170,7 +170,7 @@ def further_tables(*, users: bool = True) -> dict[str, type[FurtherTable]]:
     A user's class cannot take the place of one of the library; of two of his own with one name the later is meant.
 
     Args:
-        users: with those that are defined outside the library.
+        users: users with those that are defined outside the library.
     """
     _import_tables()
     found = [cls for base in (Checked, FurtherTable) for cls in descendants(base) if _names_a_table(cls)]
@@ -206,13 +206,13 @@ class ProjectSection(FurtherTable):
     """Texts for the head of the report and for `summary.json`.
 
     Attributes:
-        name: of the project.
-        number: of the project or order.
-        customer: for whom it is.
+        name: name of the project.
+        number: number of the project or order.
+        customer: customer of the project.
         drawing: number of the drawing.
-        revision: of the drawing.
+        revision: revision of the drawing.
         author: who made the design.
-        remark: what else is to stand there.
+        remark: further text.
     """
 
     table = "project"

@@ -55,7 +55,7 @@ class _GearTeethSection(FileTable):
             single_pitch_um, profile_slope_um, helix_slope_um, and tooth, which then counts from 0 or 1.
         flanks: CSV or Parquet file with a flank of every tooth: the columns of a flank from a file, and tooth.
         quality_class: flank tolerance class of ISO 1328-1 in whose limits of pitch and run-out deviations are drawn.
-        seed: of this draw.
+        seed: seed of this draw.
     """
 
     pitch: list[float] | None = entry(_AMOUNTS)
@@ -74,8 +74,8 @@ class TeethSection(FurtherTable):
     """Teeth that differ from each other; for `jaxgear revolution` and for the quantities of a revolution.
 
     Attributes:
-        pinion: how the teeth of the pinion deviate; they are equal without it.
-        wheel: how those of the wheel do.
+        pinion: deviations of the teeth of the pinion; equal teeth without it.
+        wheel: deviations of the teeth of the wheel; equal teeth without it.
         over: a revolution of the pinion or the wheel, the hunting period of all pairings of teeth, or a number of base
             pitches; without it the revolution of the only gear whose teeth differ, or the hunting period.
     """

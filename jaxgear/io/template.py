@@ -23,10 +23,10 @@ class Free:
     """A number that the file leaves open.
 
     Attributes:
-        name: of the variable.
-        key: where it stands.
-        number: what may stand there.
-        opposite: whether it is minus the variable.
+        name: name of the variable.
+        key: key of the number in the file.
+        number: unit and range of the number.
+        opposite: True if the number is minus the variable.
     """
 
     name: str

@@ -14,9 +14,9 @@ class ToleranceSection(FurtherTable, _LIMITS):  # type: ignore[misc, valid-type]
     """Deviations of manufactured gears after ISO 1328-1: the scatter of all designs of analyze, optimize and wear.
 
     Attributes:
-        quality_class: of both gears, or of pinion and wheel; that of the gears without it.
+        quality_class: quality class of both gears, or of pinion and wheel; that of the gears without it.
         samples: manufactured pairs per design, or variant of a sweep.
-        seed: of their deviations.
+        seed: seed of their deviations.
     """
 
     table = "tolerance"

@@ -103,7 +103,7 @@ def real(limits: Number = Number(), *, open: bool = False, plausible: bool = Tru
     Args:
         limits: unit and range.
         open: the name of a variable may stand for it, which is read as `Free`.
-        plausible: it must be of an engineer's range; otherwise that is checked later, once its unit is known.
+        plausible: True if the magnitude must be plausible; False if that is checked later, when the unit is known.
     """
     words = "a whole number" if limits.whole else "a number"
     words += " or the name of a variable" if open else ""

@@ -49,15 +49,16 @@ def write_starter(
     """Write a commented design file of a pair, ready for `jaxgear analyze` and `jaxgear optimize`.
 
     Args:
-        path: of the TOML file, which must not exist.
-        teeth: of pinion and wheel.
+        path: path of the TOML file, which must not exist.
+        teeth: teeth of pinion and wheel.
         module: [mm].
-        torque: on the pinion [N m].
-        face_width: of both gears [mm].
-        speed: of the pinion [rpm]; None for none.
-        helix_angle: of the pinion [deg].
-        pressure_angle: of the basic rack [deg]; below 20 degrees with the root radius of ISO 53 for its clearance.
-        profile_shift: of pinion and wheel [x module].
+        torque: torque on the pinion [N m].
+        face_width: face width of both gears [mm].
+        speed: speed of the pinion [rpm]; None for none.
+        helix_angle: helix angle of the pinion [deg].
+        pressure_angle: pressure angle of the basic rack [deg]; below 20 degrees with the root radius of ISO 53 for its
+            clearance.
+        profile_shift: profile shift of pinion and wheel [x module].
 
     Returns:
         the pair.
@@ -154,11 +155,11 @@ def write_design(
     """Write a design file as a whole or not at all, in place of an earlier one.
 
     Args:
-        path: of the TOML file.
+        path: path of the TOML file.
         pair: gear pair of concrete numbers.
-        torque: on the pinion [N m].
+        torque: torque on the pinion [N m].
         pinion, wheel: modifications of the flanks, of the library's classes and their sums.
-        speed: of the pinion [rpm].
+        speed: speed of the pinion [rpm].
         quality_classes: flank tolerance classes of pinion and wheel (ISO 1328-1:2013).
         title: free text.
 

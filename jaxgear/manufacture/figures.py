@@ -26,7 +26,7 @@ def tooth_space(side: Side, modification: AbstractModification, ax: Axes | None 
 
     Args:
         side: the gear's side of the contact, of `mesh.sides`.
-        modification: of both flanks; micrometres of it do not show, see `wheel_deviation`.
+        modification: modification of both flanks; micrometres of it do not show, see `wheel_deviation`.
         ax: Axes to draw into; None for a new figure.
     """
     profile = wheel_profile(side, modification)
@@ -55,7 +55,7 @@ def wheel_deviation(splines: Mapping[str, WheelSpline], ax: Axes | None = None, 
     """Deviation of dressed wheels from the design [um] over the roll length [mm], positive where too much is removed.
 
     Args:
-        splines: by name, of one gear.
+        splines: splines by name, of one gear.
         ax: Axes to draw into; None for a new figure.
         limit: that is not to be passed on either side [um]; None for none.
     """

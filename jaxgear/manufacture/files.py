@@ -25,8 +25,8 @@ def write_wheel_points(
 
     Args:
         path: file to write.
-        left: of the flank at negative x.
-        right: of the flank at positive x; None where both are alike.
+        left: profile of the flank at negative x.
+        right: profile of the flank at positive x; None where both are alike.
         wheel: adds the radius of the wheel at every point.
 
     Returns:
@@ -56,8 +56,8 @@ def write_wheel_drawing(path: str | Path, left: WheelProfile, right: WheelProfil
 
     Args:
         path: file to write.
-        left: of the flank at negative x.
-        right: of the flank at positive x; None where both are alike.
+        left: profile of the flank at negative x.
+        right: profile of the flank at positive x; None where both are alike.
 
     Returns:
         the path.

@@ -46,11 +46,11 @@ class WheelSpline(Checked):
     """Wheel profile of an involute and a polynomial, and its deviation from the design along the active profile.
 
     Attributes:
-        node_roll_length: of the node [mm].
+        node_roll_length: node roll length of the node [mm].
         node_x, node_y: the node in the frame of the wheel [mm].
         coefficients: c_k [mm^(1 - k)], k = 1 ... degree: x = node_x + sum_k c_k (y - node_y)^k.
         roll_length: where the deviation is given, from the start of the active profile to the tip [mm].
-        removed: by the design [um].
+        removed: material removed by the design [um].
         deviation: normal to the flank [um], positive where the spline removes more than the design.
         radial_deviation: the same along the height y of the wheel [um], the vertical difference of the publication;
             larger than the normal one by 1 / sin(inclination of the flank).
@@ -138,8 +138,8 @@ def wheel_spline(
 
     Args:
         side: the gear's side of the contact, of `mesh.sides`.
-        modification: of the flank, taken in the middle of the face.
-        degree: of the polynomial, 2 or 3.
+        modification: modification of the flank, taken in the middle of the face.
+        degree: degree of the polynomial, 2 or 3.
         criterion: what is made small: "least_squares", or "minimax" for the largest deviation.
         node: roll length of the node [mm], within the first 95 % of the active profile; None for the start of the
             relief (`relief_start`), or the end of these 95 % where that is earlier.

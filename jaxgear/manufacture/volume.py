@@ -46,7 +46,7 @@ def reference_volumes(side: Side, amount: Given) -> ReferenceVolumes:
 
     Args:
         side: the gear's side of the contact, of `mesh.sides`.
-        amount: at the tip [um].
+        amount: amount at the tip [um].
 
     Raises:
         ValueError: for a negative amount, or a contact ratio below 1.
@@ -73,7 +73,7 @@ def ground_volume(side: Side, modification: AbstractModification, *, stock: Give
 
     Args:
         side: the gear's side of the contact, of `mesh.sides`.
-        modification: of both flanks of every tooth.
+        modification: modification of both flanks of every tooth.
         stock: machining allowance normal to the flank [um], from the form circle to the tip and over the face.
 
     Raises:

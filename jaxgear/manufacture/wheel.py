@@ -31,10 +31,11 @@ class SpaceFlank(NamedTuple):
     """One flank of a tooth space, in the middle of the face.
 
     Attributes:
-        roll_length: of the unmodified flank [mm], shape (points,).
+        roll_length: roll length of the unmodified flank [mm], shape (points,).
         x: from the centreline of the space [mm].
-        y: from the gear centre along the centreline [mm].
-        inclination: of the unmodified flank to the centreline, positive where the space widens outwards [rad].
+        y: distance from the gear centre along the centreline [mm].
+        inclination: inclination of the unmodified flank to the centreline, positive where the space widens outwards
+            [rad].
         removed: material that the modification removes, along the normal [um].
     """
 
@@ -52,7 +53,7 @@ def space_flank(
 
     Args:
         side: the gear's side of the contact, of `mesh.sides`.
-        modification: of this flank; the other one is its mirror image where both are alike.
+        modification: modification of this flank; the other one is its mirror image where both are alike.
         roll_length: where [mm], shape (points,); None for evenly spaced points from the form circle to the tip.
         points: their number.
 
@@ -98,10 +99,11 @@ class WheelProfile(NamedTuple):
 
     Attributes:
         x: from the middle plane of the wheel [mm], shape (points,).
-        y: from the wheel's outer diameter towards its axis [mm].
-        diameter: of the gear, on which the point grinds [mm].
-        roll_length: of the unmodified flank [mm]; the last is longer than that of the tip by what is removed there.
-        removed: by the modification [um].
+        y: distance from the wheel's outer diameter towards its axis [mm].
+        diameter: diameter of the gear, on which the point grinds [mm].
+        roll_length: roll length of the unmodified flank [mm]; the last is longer than that of the tip by what is
+            removed there.
+        removed: material removed by the modification [um].
     """
 
     x: Profile
@@ -131,7 +133,7 @@ class GrindingWheel(Checked):
 
     Attributes:
         radius: outer radius [mm].
-        flange_radius: of the flanges or the spindle that hold it [mm].
+        flange_radius: flange radius of the flanges or the spindle that hold it [mm].
     """
 
     radius: Scalar = number("mm", low=0.0, open_low=True)
@@ -149,7 +151,8 @@ def wheel_profile(side: Side, modification: AbstractModification, *, points: int
 
     Args:
         side: the gear's side of the contact, of `mesh.sides`.
-        modification: of the flank, taken in the middle of the face; what varies along the face comes from the feed.
+        modification: modification of the flank, taken in the middle of the face; what varies along the face comes from
+            the feed.
         points: evenly spaced in roll length from the form circle to where the modified flank meets the tip form circle.
 
     Raises:

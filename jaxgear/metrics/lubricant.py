@@ -60,10 +60,10 @@ class Lubricant(AbstractSettings):
     Attributes:
         viscosity_40: kinematic viscosity at 40 degC.
         viscosity_100: kinematic viscosity at 100 degC.
-        temperature: of the oil that reaches the mesh.
+        temperature: temperature of the oil that reaches the mesh.
         roughness: arithmetic mean roughness Ra of the flanks, mean of pinion and wheel.
         base: kind of oil, which says how pressure thickens it and how slippery it is.
-        density: at 15 degC; None for that of an oil of this viscosity, 43.37 log10(viscosity_40) + 805.5.
+        density: density at 15 degC; None for that of an oil of this viscosity, 43.37 log10(viscosity_40) + 805.5.
         friction: law of the mean coefficient of friction, see `friction_coefficient`; a coefficient that is given with
             the load counts in its place.
         friction_factor: X_L of these laws; None for 1 of mineral oil, 0.8 of polyalphaolefin, 0.7 of polyglycol.
@@ -83,7 +83,7 @@ class Lubricant(AbstractSettings):
         pinion_immersion, wheel_immersion: depths to which the gears dip into the oil at rest, for the losses without
             load.
         splash_factor: C_Sp of the no-load loss, 1 for spray lubrication; see `rating.splash_factor`.
-        oil_volume: of the bath, for the churning loss.
+        oil_volume: oil volume of the bath, for the churning loss.
         load_factor: product of the load factors, K_A K_gamma K_v K_Hbeta K_Halpha as far as the contact analysis does
             not know them, for friction by ISO, flash temperature and film. The power loss, and with `bulk` = "loss" the
             bulk temperature, count the torque itself.

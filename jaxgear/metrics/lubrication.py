@@ -35,7 +35,7 @@ def flash_temperature(
 
     Args:
         cycle: solved mesh cycle.
-        speed: of the pinion [rpm], scalar.
+        speed: speed of the pinion [rpm], scalar.
         friction: mean coefficient of friction; 0.06 is the leading constant of ISO/TR 13989-1 at unit load and speed
             terms.
 
@@ -77,7 +77,7 @@ def flash_rise(
         line_load: along the contact line [N/mm].
         radius: relative radius of curvature in the section normal to it [mm].
         modulus: E* of both flanks [MPa].
-        speeds: of both surfaces through the contact [m/s].
+        speeds: speeds of both surfaces through the contact [m/s].
         sinks: thermal contact coefficients of both materials [N/(m s^0.5 K)].
     """
     half_width = safe_sqrt(4 * line_load * radius / modulus / jnp.pi) * 1e-3  # [m]
@@ -190,7 +190,7 @@ def mean_friction(lubricant: Lubricant, law: FrictionLaw, line_load: Given, roll
     """The laws of `friction_coefficient` on their own.
 
     Args:
-        lubricant: at its own temperature.
+        lubricant: lubricant at its own temperature.
         law: one of them; ISO/TS 6336-21 has that of ISO/TS 6336-22.
         line_load: w with what the law counts in it [N/mm].
         rolling: sum of the rolling speeds [m/s].
@@ -328,9 +328,9 @@ def film_between(
         lubricant: oil.
         radius: normal relative radius of curvature [mm].
         rolling: sum of the rolling speeds [m/s].
-        pressure: of Hertz, greater than 0 [MPa].
+        pressure: pressure of Hertz, greater than 0 [MPa].
         modulus: E_r = 2 E* [MPa].
-        temperatures: of the teeth and in the contact [degC].
+        temperatures: temperatures of the teeth and in the contact [degC].
     """
     bulk, hot = temperatures
     viscosity, coefficient = lubricant.viscosity(bulk), lubricant.pressure_viscosity(bulk)

@@ -178,7 +178,7 @@ class Quantity(eqx.Module):
             an array that the reduction makes one of. Traced, so it must be pure; every use of one quantity shares
             compiled programs as long as it is the same function.
         unit: "" for a pure number.
-        meaning: in a few words.
+        meaning: meaning in a few words.
         reduction: reduction of an array to one number, over all its axes. Linear programs keep the extremes of `Max`,
             `Min` and `Range` exact; gradient methods soften them.
         better: "smaller" or "larger": direction of improvement for objectives, worst cases and fronts.

@@ -47,7 +47,7 @@ class Strength(AbstractSettings):
         pitting_exponent: p of the S-N curve N = `pitting_cycles` (pitting / stress)^p of the pinion, and of the wheel
             where it has none of its own, for damage; without an endurance limit.
         pitting_cycles: load cycles for which `pitting` is permissible, likewise.
-        bending_exponent: of the S-N curve of the tooth roots, likewise.
+        bending_exponent: bending exponent of the S-N curve of the tooth roots, likewise.
         bending_cycles: load cycles for which `bending` is permissible, likewise.
         wheel_pitting_exponent, wheel_pitting_cycles: those of the wheel; None for those of the pinion.
         wheel_bending_exponent, wheel_bending_cycles: those of the wheel; None for those of the pinion.

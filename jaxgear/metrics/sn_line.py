@@ -22,9 +22,9 @@ class SNLine(Checked):
     """Bearable stress over load cycles, straight between points on logarithmic scales.
 
     Attributes:
-        cycles: of the points, rising.
+        cycles: cycles of the points, rising.
         stress: borne for so many cycles; the first is borne for fewer cycles too.
-        endures: whether the last stress is borne for ever; else the line goes on beyond it.
+        endures: True if the last stress is borne for ever; else the line goes on beyond it.
     """
 
     cycles: Float[Array, " points"] = result()

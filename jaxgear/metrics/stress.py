@@ -150,7 +150,7 @@ class RootFactors(Checked):
         load_angle: alpha_Fen [rad].
         load_diameter: d_en, of helical gears that of the virtual gear.
         notch: q_s, before it is limited to the validity of Y_S.
-        section: at the 30 degree tangent.
+        section: section at the 30 degree tangent.
     """
 
     form: Real = result()

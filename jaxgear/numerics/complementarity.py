@@ -70,7 +70,7 @@ class Factors(NamedTuple):
     """The system of the active springs, eliminated.
 
     Attributes:
-        inverse: of C + slope, of every slice on its own; zero where springs are apart.
+        inverse: inverse of C + slope, of every slice on its own; zero where springs are apart.
         per_slope: load per opening of every spring, about.
         coupled: what couples the slices.
     """
@@ -85,8 +85,8 @@ def eliminate(problem: ContactProblem, active: Active, slope: Slopes) -> Factors
 
     Args:
         problem: the data.
-        active: which springs are in contact, (slices, positions) each.
-        slope: of the springs.
+        active: True for springs in contact, (slices, positions) each.
+        slope: slope of the springs.
     """
     inverse, per_slope = inverse_of(problem.compliance, active, slope)
     if problem.coupling is None:
@@ -115,7 +115,7 @@ def respond(
 
     Args:
         problem: the data.
-        factors: from `eliminate`.
+        factors: factors from `eliminate`.
         known: right side; it does not count where springs are apart.
         load: total load; None where the approach is given.
         approach: None where the load is given.

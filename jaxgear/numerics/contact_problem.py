@@ -105,9 +105,9 @@ class ContactSolution(eqx.Module):
         load: total load, shape (positions,).
         opening: y without the spring's own deflection, C q + gap - lever d, shape (springs, slices, positions): the
             remaining gap where it is positive, minus the contact deflection h(q) where the spring is loaded.
-        in_contact: which springs carry load, shape (springs, slices, positions).
+        in_contact: True for springs under load, shape (springs, slices, positions).
         residual: largest violation of any condition, relative to the approach and to the load, shape (positions,).
-        converged: whether the residual is as small as it has to be, shape (positions,).
+        converged: True if the residual is as small as it has to be, shape (positions,).
     """
 
     line_load: Float[Array, "springs slices positions"]

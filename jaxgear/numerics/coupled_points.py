@@ -33,7 +33,7 @@ class Pressed(eqx.Module):
         approach: d.
         opening: y, shape (points,).
         in_contact: shape (points,).
-        converged: whether all conditions hold.
+        converged: True if all conditions hold.
     """
 
     force: Vector
@@ -48,7 +48,7 @@ def press(compliance: Float[Array, "points points"], gap: Vector, load: Float[Ar
 
     Args:
         compliance: M.
-        gap: of the points without load.
+        gap: gap of the points without load.
         load: sum of all forces.
 
     Returns:

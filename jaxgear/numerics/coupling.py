@@ -50,7 +50,7 @@ def inverse_of(
 
     Args:
         compliance: C.
-        active: which springs are in contact, (slices, positions) each.
+        active: True for springs in contact, (slices, positions) each.
         slope: dh/dq of every spring, (slices, positions) or (1, positions) each.
     """
     mask = [flag.astype(compliance.dtype) for flag in active]
@@ -66,7 +66,7 @@ def _bordered(lower: list[list[Array]], mask: Sequence[Array | float]) -> tuple[
 
     Args:
         lower: its rows up to the diagonal.
-        mask: of every row; what belongs to those of zero, which have to be zero beside the diagonal, is left out.
+        mask: mask of every row; what belongs to those of zero, which have to be zero beside the diagonal, is left out.
     """
     inverse: list[list[Array]] = []
     pivots: list[Array] = []
@@ -119,7 +119,7 @@ class SliceCoupling(eqx.Module):
             spring touches elsewhere. None for one throughout.
         support_modes: R, orthonormal likewise, the constant first; None without a support.
         support: H, symmetric and positive semi-definite, the deflection under loads; None without a support.
-        inverse: of K, for eliminations, see `with_inverse`; None before.
+        inverse: inverse of K, for eliminations, see `with_inverse`; None before.
     """
 
     modes: Float[Array, "slices modes"]
@@ -251,7 +251,7 @@ class _Block(NamedTuple):
     Attributes:
         scaled: L D.
         lower: L, below the diagonal.
-        inverse: of D.
+        inverse: inverse of D.
     """
 
     scaled: Float[Array, "modes places places positions"]
@@ -264,7 +264,7 @@ class CoupledFactors(NamedTuple):
 
     Attributes:
         coupling, weight, lever: as of `couple`.
-        blocks: of the modal system.
+        blocks: blocks of the modal system.
         bent: L^-1 (D V)^T w A^-1 X by mode, and D^-1 times it.
         force: z under unit b, symmetric.
         yielding: b under unit H z, and under unit approach in its first column; see `_yielding`.
@@ -283,9 +283,9 @@ def couple(coupling: SliceCoupling, weight: Weight, lever: Levers, inverse: Inve
     """Eliminate the coupling of the slices.
 
     Args:
-        coupling: with its inverse.
+        coupling: coupling with its inverse.
         weight: w.
-        lever: what a spring closes per unit of common approach.
+        lever: closing of a spring per unit of common approach.
         inverse: A^-1, zero where springs are apart, by springs.
     """
     modal = _products(coupling, weight, inverse)
@@ -394,7 +394,7 @@ def pressed_by(
     """Deflections that the coupling adds to the known ones, X b - D V m, and the approach.
 
     Args:
-        factors: from `couple`.
+        factors: factors from `couple`.
         within: A^-1 known.
         load: total over the slices, of w and the levers times the line loads; None for that of an `approach`.
         approach: the approach; None for that of a `load`.

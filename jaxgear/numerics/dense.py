@@ -32,7 +32,7 @@ def solve_dense(matrix: Matrix, right: Right) -> Right:
     Differentiable any number of times.
 
     Args:
-        matrix: of full rank, with rows of comparable size.
+        matrix: matrix of full rank, with rows of comparable size.
         right: one right side, or columns of several.
     """
     fixed = jax.lax.stop_gradient(matrix)
@@ -124,7 +124,7 @@ def pseudo_inverse(matrix: Matrix, least: float) -> Matrix:
     """Moore and Penrose's inverse of a matrix.
 
     Args:
-        matrix: of any rank; its derivatives hold where that does not change.
+        matrix: matrix of any rank; its derivatives hold where that does not change.
         least: singular value that counts, over the largest one.
     """
     largest = jnp.max(jnp.abs(matrix))

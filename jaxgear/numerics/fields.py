@@ -32,7 +32,7 @@ class Usual(NamedTuple):
     Attributes:
         low, high: the range.
         unit: unit of the range; of a number field, the unit of the field.
-        remark: what is likely meant by another number, or what such a number means; with its source.
+        remark: probable cause or meaning of a number out of the range, with its source.
     """
 
     low: float
@@ -60,7 +60,7 @@ class UnitKey(str):
     Attributes:
         name: without the unit.
         unit: "" for a pure number.
-        heading: in words with the unit in brackets.
+        heading: heading in words with the unit in brackets.
     """
 
     name: str

@@ -27,9 +27,9 @@ def fit(columns: Columns, values: Values, criterion: Criterion) -> Coefficients:
     """Coefficients of the columns.
 
     Args:
-        columns: of full rank. For "minimax" every square part of them must be (Haar's condition), as for powers of
-            positive numbers in increasing order.
-        values: what is fitted.
+        columns: columns of full rank. For "minimax" every square part of them must be (Haar's condition), as for powers
+            of positive numbers in increasing order.
+        values: values to fit.
         criterion: "least_squares", or "minimax" for the least largest residual, by Remez' exchange of one point at a
             time; its derivative is that of the points that bear the largest residual.
     """
@@ -122,7 +122,7 @@ def real_roots(coefficients: Float[Array, " terms"]) -> Float[Array, " degree"]:
     by the bound of Fujiwara; Newton steps polish the real ones.
 
     Args:
-        coefficients: from the constant one up; the last one is not zero.
+        coefficients: coefficients from the constant one up; the last one is not zero.
     """
     fixed = jax.lax.stop_gradient(coefficients / coefficients[-1])
     degree, eps = len(coefficients) - 1, float(jnp.finfo(fixed.dtype).eps)

@@ -53,7 +53,7 @@ def by_numbers(function: Callable[_Given, Result], *, entrywise: Collection[int]
     differentiated as always.
 
     Args:
-        function: of positional arguments.
+        function: function of positional arguments.
         entrywise: places of the arguments each entry of which acts on that entry of the results alone, or on all along
             an axis of which it has length one.
     """
@@ -174,7 +174,7 @@ def at_root(function: Callable[..., tuple[Real, ...]], search: Callable[..., Rea
     Args:
         function: (root, *given) -> (*results, residual); the residual rises with the root.
         search: (*given) -> root, to rounding; it is never differentiated.
-        given: what both depend on; derivatives flow through it.
+        given: arguments of both functions; derivatives flow through them.
 
     Returns:
         (*results, root)
@@ -264,7 +264,7 @@ class NewtonRoot(NamedTuple):
         residual: residual of the equations at the root.
         jacobian: Jacobian of the equations at the root.
         steps: number of evaluations.
-        converged: whether the next step would have been below the tolerance.
+        converged: True if the next step would have been below the tolerance.
     """
 
     root: Vector

@@ -123,7 +123,7 @@ def next_generation(
     """A population that replaces the given one.
 
     Args:
-        key: of the random numbers.
+        key: key of the random numbers.
         strings: the population.
         fitness: not negative, nor NaN; a string becomes a parent with the probability of its share in the sum. Where
             the sum is zero all are alike.

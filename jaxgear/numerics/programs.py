@@ -181,7 +181,7 @@ class _Program(NamedTuple):
 
     Attributes:
         run: makes a list of arrays from arrays.
-        result: what the function returns, with a `_Shape` in place of every array.
+        result: result of the function, with a `_Shape` in place of every array.
     """
 
     run: Future[_Run]
@@ -195,7 +195,7 @@ class ProgramStore:
     """Compiled programs by their inputs and code; compiles in threads of its own.
 
     Args:
-        shelf: where they lie between two processes.
+        shelf: store of the programs between two processes.
         threads: that compile.
     """
 

@@ -20,9 +20,9 @@ def interpolate(x: Float[Array, "..."], positions: Points, values: Points, metho
     """Value at x, of any shape; constant beyond the first and the last point.
 
     Args:
-        x: where.
+        x: places of interpolation.
         positions: increasing, at least 2.
-        values: at the positions.
+        values: values at the positions.
         method: "linear", "natural_cubic" (natural cubic spline) or "monotonic" (no overshoot between the points).
     """
     return interpolate_columns(x, positions, values[:, None], method)(jnp.zeros_like(x, int))

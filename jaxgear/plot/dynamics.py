@@ -189,7 +189,8 @@ def bifurcation(responses: Runs, ax: Axes | None = None, *, title: str = "") -> 
     An orbit of one mesh cycle shows as one point, one of two as two, an aperiodic one as a cloud.
 
     Args:
-        responses: of one or several runs, by what the legend says of each; in a sequence each has its direction.
+        responses: responses of one or several runs, by what the legend says of each; in a sequence each has its
+            direction.
         ax: Axes to draw into; None for a new figure.
         title: title above the Axes and the legend.
     """

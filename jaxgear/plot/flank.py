@@ -72,7 +72,7 @@ def _flank_panels(
         above: distance of a legend from a panel of a given figure [pt].
         tolerance: classes of pinion and wheel, for a band about a design.
         about: the name of this design; None for the first.
-        band: what makes it of one panel.
+        band: function that makes the band of one panel.
     """
     own = ax is None
     with report_axes(ax, columns=2, width=WIDTH, height=HEIGHT) as panels:

@@ -50,7 +50,7 @@ def _objective_labels(problem: Problem | None) -> list[str]:
     """Labels of the objectives of a problem: "95 % CVaR of peak-to-peak transmission error [µm]".
 
     Args:
-        problem: what was solved; None for the peak-to-peak transmission error of one curve.
+        problem: solved problem; None for the peak-to-peak transmission error of one curve.
     """
     if problem is None:
         return [meaning_label(quantities["ppte"])]
@@ -238,9 +238,9 @@ def parallel_coordinates(
             from left to right, at least two.
         colour_by: column of the colour, which also decides what is best.
         ax: Axes to draw into; None for a new figure.
-        best: how many of the best variants stand out, with their number in the legend; up to 5.
-        shown: how many of the others to draw at most, at random; the picture says how many of how many.
-        numbers: of the variants; None for their row numbers.
+        best: number of the best variants that are highlighted, with their number in the legend; up to 5.
+        shown: largest number of other variants, drawn at random; the figure states their share.
+        numbers: numbers of the variants; None for their row numbers.
 
     Raises:
         ValueError: for less than two columns, a colour that is none of them, or no variant with finite values.

@@ -49,7 +49,7 @@ def order_spectrum(
         found: revolution of one design.
         teeth: that it was solved for.
         ax: Axes to draw into; None for a new figure.
-        harmonics: of the mesh that are shown.
+        harmonics: harmonics of the mesh that are shown.
         title: title of the Axes.
     """
     amplitude = amplitudes(found.transmission_error)

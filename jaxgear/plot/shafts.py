@@ -24,7 +24,7 @@ def shaft_deflection(gearbox: Gearbox, ax: Panels | None = None) -> np.ndarray:
     lie at the axial places at which their gears mesh. Every mesh loads its gears evenly over the face.
 
     Args:
-        gearbox: with the torques of its couplings.
+        gearbox: gearbox with the torques of its couplings.
         ax: one Axes per shaft; None for a new figure.
 
     Returns:

@@ -383,7 +383,7 @@ def radar(
         table: values of every variant by what they are, a `Quantity` or a column of a sweep: the results on the spokes,
             at least three.
         variants: row numbers of the variants; None for all rows, of which a page holds about nine.
-        names: of the variants; None for their row numbers.
+        names: names of the variants; None for their row numbers.
         ax: one polar Axes per variant; None for a new figure.
         note: text below the charts that applies to all values, such as "mean over torques".
 

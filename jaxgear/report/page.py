@@ -85,7 +85,7 @@ class Figure:
 
     Attributes:
         name: name of its file without the ending.
-        caption: what it shows, for the report.
+        caption: caption in the report.
         axes: Axes that it consists of, one or an array.
     """
 
@@ -111,9 +111,9 @@ class Picture:
 
     Attributes:
         name: name of the file without the ending.
-        caption: what it shows.
+        caption: caption.
         data: the PNG file as a data URI.
-        width: on paper at its own size [mm].
+        width: width on paper at its own size [mm].
     """
 
     name: str
@@ -127,13 +127,13 @@ class Chapter:
     """A part of the report under its own title.
 
     Attributes:
-        title: of the part.
+        title: title of the part.
         lines: paragraphs.
         warnings: paragraphs that must not be missed.
-        points: of a list.
+        points: points of a list.
         tables, figures: in this order after the text.
         literal: a text in which every blank counts.
-        new_page: whether it starts on a new page when printed.
+        new_page: True if the chapter starts on a new page when printed.
     """
 
     title: str
@@ -152,8 +152,8 @@ class Part:
 
     Attributes:
         tables: to be read first, after those of the designs.
-        chapters: of the report.
-        data: for `summary.json`, under the name of the table.
+        chapters: chapters of the report.
+        data: data for `summary.json`, under the name of the table.
         lines: rows of a CSV file of that name, the first its header; none without any.
         figures: functions that draw one each.
     """

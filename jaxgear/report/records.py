@@ -21,7 +21,7 @@ class Record(Generic[Row]):
         name: name without the unit, as files carry it.
         unit: "" for a pure number or a text.
         of: computes it from a row; None where the row has no such number.
-        heading: as tables call it; "" for the heading of the key, None for a number that tables do not show.
+        heading: heading in tables; "" for the heading of the key, None for a number that tables do not show.
         form: format of a table as in `format`, or a function that gives the text.
     """
 
@@ -65,7 +65,7 @@ def table_of(
 
     Args:
         records: numbers of a row.
-        rows: with their names, of which several may be the same.
+        rows: rows with their names, of which several may be the same.
         title: over the table.
         corner: heading of the names.
         across: True for rows side by side, a number per line.

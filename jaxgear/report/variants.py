@@ -122,7 +122,7 @@ def write_variants(
 
     Args:
         path: file to write.
-        title: of the sweep.
+        title: title of the sweep.
         facts: name and text of what identifies it.
         table: all variants.
 

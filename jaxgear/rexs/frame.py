@@ -25,7 +25,7 @@ class Frame:
     """One gear's flank within its pair, all numbers in mm.
 
     Attributes:
-        base_radius: of the gear.
+        base_radius: base radius of the gear.
         start, tip: roll lengths at both ends of the active profile.
         width: face width of the gear.
         datum: -1 where the datum face is at negative coordinates of the file, 1 at positive ones.

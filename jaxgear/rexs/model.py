@@ -74,9 +74,9 @@ class Component:
     """Part of the gear unit, or data that belong to a part.
 
     Attributes:
-        id: of the file, 0 for what the file does not hold.
+        id: id in the file, 0 for a component that is not in the file.
         type, name: of the component.
-        attributes: by their names.
+        attributes: attributes by their names.
         without_unit: attributes that were taken in the unit of the standard.
         keys: keys of a design file, by the attributes that a user may give beside the file.
     """

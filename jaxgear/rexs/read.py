@@ -131,7 +131,7 @@ class Stage(NamedTuple):
     Attributes:
         stage, gears: components; the pinion first.
         pair: the gears.
-        modifications: of the flanks of pinion and wheel.
+        modifications: modifications of the flanks of pinion and wheel.
     """
 
     stage: Component
@@ -428,7 +428,7 @@ def rexs_stages(path: str | Path) -> tuple[RexsStage, ...]:
     """Every stage of a REXS file, with the reason why a stage cannot be read.
 
     Args:
-        path: of the file, see `read_rexs`.
+        path: path of the file, see `read_rexs`.
 
     Raises:
         DesignFileError: where the file is not a REXS file.

@@ -59,7 +59,7 @@ def write_rexs(
         quality_classes: flank tolerance classes of pinion and wheel (ISO 1328-1:2013).
         materials: names of the materials of pinion and wheel.
         title: free text.
-        error: by how much the points that stand for a curve unknown to REXS may be off it [um].
+        error: permissible deviation of the points that represent a curve unknown to REXS [um].
 
     Raises:
         ValueError: for traced numbers or several pairs, a cycle of another pair, with batch axes or that did not
@@ -156,7 +156,7 @@ def _write_results(
         stage_data: component that holds the pinion's data of the stage.
         cycle: solved mesh cycle.
         case: load case under which they stand.
-        speed: of the pinion [rpm].
+        speed: speed of the pinion [rpm].
         friction: mean coefficient of friction, None for the library's default.
     """
     kinematics, (side, _) = cycle.kinematics, cycle.sides

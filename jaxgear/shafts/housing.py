@@ -328,7 +328,7 @@ def condense(
 
     Args:
         stiffness: sparse symmetric matrix [N/mm], without the rows and columns of fixed degrees of freedom.
-        seats: for every bearing name the nodal forces of unit loads in x, y, z (, rx, ry), for instance from
+        seats: by the name of the bearing, the nodal forces of unit loads in x, y, z (, rx, ry), for instance from
             `spread_forces`, shape (rows, 3 or 5).
 
     Raises:

@@ -298,8 +298,8 @@ class ShaftFacts(NamedTuple):
     Attributes:
         length: length of the shaft [mm].
         low, high: ends of all parts on the shaft [mm], shape (items,).
-        inside: for every item, True if it lies within the shaft.
-        hollow: for every section, True if its bore is less than its diameter.
+        inside: True for items within the shaft.
+        hollow: True for sections with a bore less than the diameter.
         thinnest, thickest: smallest and largest diameter of the sections under the face of every gear [mm].
         body: body diameter of every gear, 0 where it has none [mm].
         tip: tip diameter of every gear [mm].

@@ -102,7 +102,7 @@ def beam(edges: Float[Array, " edges"], diameter: Pieces, bore: Pieces, material
     Args:
         edges: ends of the pieces in ascending order [mm], shape (edges,).
         diameter, bore: outer and inner diameter of every piece [mm].
-        material: of all pieces.
+        material: material of all pieces.
     """
     modulus, poisson_ratio = material.elastic_modulus, material.poisson_ratio
     area = jnp.pi / 4 * (diameter**2 - bore**2)

@@ -52,7 +52,7 @@ class Evaluation:
         failed_torques: torques without a converged contact solution [N m], the design torque included.
         cause: most basic reason at the failed torques, in words.
         seconds: time for search and evaluation [s], without compilation of the evaluation.
-        factors: of the rating by ISO 6336 at the design torque, by name and unit.
+        factors: factors of the rating by ISO 6336 at the design torque, by name and unit.
         verified: results with the finite-element structure; None where they were not computed.
         face_load: face load factor over the torques, shape (torques,); empty for one slice.
         scatter: scatter over manufactured gears; None if the file has no tolerances.

@@ -40,7 +40,8 @@ class Scatter(Checked):
         phase: mesh position in base pitches, shape (positions,).
         nominal_transmission_error: transmission error of the design without deviations [um], shape (positions,).
         quantiles: levels of the quantile curves, ascending, shape (quantiles,).
-        transmission_error_quantiles: of the transmission error at every phase [um], shape (quantiles, positions).
+        transmission_error_quantiles: quantiles of the transmission error at every phase [um], shape
+            (quantiles, positions).
         numbers: values of the further results by name with unit, shape (samples,) each, NaN for failed samples.
     """
 
@@ -115,7 +116,7 @@ def monte_carlo(
 
     Args:
         mesh: prepared mesh.
-        torque: on the pinion [N m], scalar.
+        torque: torque on the pinion [N m], scalar.
         manufactured: manufactured gears, at least 2.
         pinion: modification of the pinion flank; None for the nominal involute.
         wheel: modification of the wheel flank; None for the nominal involute.

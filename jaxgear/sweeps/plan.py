@@ -105,7 +105,7 @@ class VariantList(AbstractPlan):
         """Makes the plan.
 
         Args:
-            names: of the parameters.
+            names: names of the parameters.
             values: shape (variants, names); numbers that are not finite are failed variants, not errors.
 
         Raises:
@@ -183,7 +183,7 @@ class _Sampling(AbstractPlan):
         Args:
             bounds: (low, high) of every parameter.
             samples: number of variants.
-            seed: of the random numbers.
+            seed: seed of the random numbers.
 
         Raises:
             ValueError: for wrong bounds, samples or seed.

@@ -218,8 +218,8 @@ def sweep(
         part_rows: variants per file, of which an interruption costs those under way; None for 64 files of at most
             131072 variants and at least as many as the devices evaluate at once, or for those of the sweep that is
             resumed. The rows do not depend on it.
-        title: of the table.
-        units: of the parameters, for the table.
+        title: title of the table.
+        units: units of the parameters, for the table.
         callback: called as callback(variants done, variants of this process, None) before the first part, when those of
             an earlier call are done already, and after every part.
 

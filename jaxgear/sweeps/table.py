@@ -67,7 +67,7 @@ class SweepTable:
     A method takes the name of a column with or without its unit: "ppte_um" or "ppte".
 
     Attributes:
-        title: of the sweep.
+        title: title of the sweep.
         columns: all columns, each with the quantity that it holds and its cases.
     """
 
@@ -81,7 +81,7 @@ class SweepTable:
         """Made by `sweep` and `open_sweep`.
 
         Args:
-            title: of the sweep.
+            title: title of the sweep.
             columns: all columns.
             sizes: number of rows of every part.
             read: read(part, names) gives these columns of a part as an Arrow table, all columns for None.
@@ -136,7 +136,7 @@ class SweepTable:
         """Values of columns, one part of the table after the other.
 
         Args:
-            names: of the columns wanted, None for all.
+            names: names of the columns wanted, None for all.
 
         Raises:
             ValueError: for an unknown column.

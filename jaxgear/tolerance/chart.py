@@ -33,7 +33,7 @@ class Trace(Checked):
 
     Attributes:
         kind: "profile" along the tooth depth, or "helix" along the face.
-        face_coordinate: from the middle of the face [mm].
+        face_coordinate: face coordinate from the middle of the face [mm].
         roll_angle: [deg].
         roll_length: [mm].
         diameter: [mm].
@@ -120,9 +120,9 @@ def profile_trace(
 
     Args:
         side: the gear's side of the contact, of `mesh.sides`.
-        modification: of the flank.
+        modification: modification of the flank.
         tolerance: class of the gear, for the band; None for no band.
-        face_coordinate: of the trace [mm].
+        face_coordinate: face coordinate of the trace [mm].
         roll_length: where, shape (points,) [mm]; None for evenly spaced points.
         points: their number.
 
@@ -151,9 +151,9 @@ def helix_trace(
 
     Args:
         side: the gear's side of the contact, of `mesh.sides`.
-        modification: of the flank.
+        modification: modification of the flank.
         tolerance: class of the gear, for the band; None for no band.
-        roll_length: of the trace [mm]; None for the pitch point.
+        roll_length: roll length of the trace [mm]; None for the pitch point.
         face_coordinate: where, shape (points,) [mm]; None for evenly spaced points.
         points: their number.
 

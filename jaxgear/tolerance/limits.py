@@ -209,7 +209,7 @@ class Tolerance(Checked):
 
         Args:
             pair: gear pair.
-            quality_class: of both gears, 1 (finest) to 11, or one for the pinion and one for the wheel.
+            quality_class: quality class of both gears, 1 (finest) to 11, or one for the pinion and one for the wheel.
             misalignment: [um over the face width]; None without.
             distribution: between the limits; None for `TruncatedNormal()`, the limits at three standard deviations.
             rounded: to the steps of the standard; False keeps the limits differentiable with respect to the gears.
