@@ -8,7 +8,7 @@ from rated_pairs import FZG_C, STAGE_3, rated, unlimited, with_rating
 
 import jaxgear as jg
 from jaxgear.contact.status import Status
-from jaxgear.metrics import SNLine
+from jaxgear.metrics import Lubricant, SNLine
 from jaxgear.numerics import changed, quick_jit
 from jaxgear.rating import GearRating, Rating, mesh_geometry, rate, rating_findings
 from jaxgear.rating.flank import flank_factors
@@ -179,6 +179,16 @@ def test_a_line_and_its_inverse():
     assert np.allclose(line.damage(line.bears(cycles) * (1 + 1e-12), cycles), 1.0, atol=1e-6)
 
 
+def test_a_power_law_goes_on_for_ever():
+    line = SNLine.power_law(jnp.asarray(1000.0), jnp.asarray(1e6), jnp.asarray(6.0))
+    stress = jnp.array([10.0, 1000.0, 3000.0])
+    expected = 1e6 * (1000 / stress) ** 6
+    assert np.allclose(line.damage(stress, 1.0), 1 / expected, rtol=1e-9)
+    assert np.allclose(line.bears(expected[:2]), stress[:2], rtol=1e-9)
+    none, slope = jax.value_and_grad(lambda stress: line.damage(stress, 1.0))(0.0)
+    assert none == slope == 0
+
+
 def test_worked_spectrum_with_factors_held():
     """Stresses, damages and safeties of a spectrum of four torques; damages of bins to the printed digits."""
     shares = [0.0005, 0.01, 0.10, 0.8895]
@@ -301,6 +311,15 @@ def test_derivatives_of_every_safety():
 def test_settings_of_a_gear_that_are_refused(given, message):
     with pytest.raises(ValueError, match=message):
         GearRating(**given)
+
+
+def test_roughnesses_of_the_same_flanks_agree():
+    gears = [GearRating("case_hardened", flank_roughness_ra=roughness) for roughness in (0.4, 0.6)]
+    given = {"pinion": gears[0], "wheel": gears[1]}
+    Rating(lubricant=Lubricant(220.0, 19.0, 80.0, 0.5), **given)
+    message = "flank_roughness_ra = 0.4 and 0.6 um must have the mean lubricant.roughness = 0.6 um"
+    with pytest.raises(ValueError, match=message):
+        Rating(lubricant=Lubricant(220.0, 19.0, 80.0, 0.6), **given)
 
 
 def test_ratings_that_are_refused():

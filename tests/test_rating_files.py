@@ -3,6 +3,7 @@
 import re
 from dataclasses import replace
 
+import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -76,6 +77,21 @@ def test_settings_of_a_file(tmp_path):
     spectrum = loaded(tmp_path, with_lines(application_factor="", service_life=SPECTRUM.format("0.25, 0.75")))
     loads = spectrum.tables["rating"].settings(spectrum).loads
     assert np.allclose(loads.torques, [200.0, 100.0]) and np.allclose(loads.speeds, 3000.0)
+
+
+def test_what_both_gears_have_in_common_is_said_once(tmp_path):
+    def settings(text):
+        design = loaded(tmp_path, text)
+        return design.tables["rating"].settings(design)
+
+    twice = TEXT[: TEXT.index("[rating.pinion]")] + "[rating.gears]\n"
+    twice += 'heat_treatment = "through_hardened"\nhardness = 300.0\nyield_strength = 800.0\nflank_roughness_rz = 4.0\n'
+    both = settings(twice + "root_roughness_rz = 16.0\n")
+    assert eqx.tree_equal(both.pinion, both.wheel) and float(both.pinion.hardness) == 300
+    other = settings(twice + "root_roughness_rz = 16.0\n[rating.pinion]\nhardness = 320.0\n")
+    assert eqx.tree_equal(other.wheel, both.wheel) and float(other.pinion.hardness) == 320
+    with pytest.raises(DesignFileError, match=r"rating.pinion.root_roughness_rz: missing, Y_RrelT needs it"):
+        settings(twice)
 
 
 def test_a_quantity_named_like_one_of_strengths_is_that_of_the_table(tmp_path):

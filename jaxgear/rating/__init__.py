@@ -15,7 +15,9 @@ from .load_factors import LoadFactors as LoadFactors
 from .losses import splash_factor as splash_factor
 from .mesh_geometry import MeshGeometry as MeshGeometry
 from .mesh_geometry import mesh_geometry as mesh_geometry
+from .quantities import RATING_QUANTITIES as RATING_QUANTITIES
 from .settings import GearRating as GearRating
 from .settings import Rating as Rating
 from .thermal import ThermalRating as ThermalRating
 from .thermal import thermal_rating as thermal_rating
+from .thermal_quantities import THERMAL_QUANTITIES as THERMAL_QUANTITIES

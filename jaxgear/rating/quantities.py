@@ -28,8 +28,9 @@ Number = Callable[[PairRating], Any]
 def rating_of(analysis: Analysis, rating: Rating) -> PairRating:
     """The rating of an analyzed design under its load, worked out once for all quantities of the same settings.
 
-    K_Hbeta is that of the contact analysis under the torque as it stands, without K_A K_gamma K_v, which is on the safe
-    side where the load levels out as it grows; 1 on one slice. C_a is the relief of the flanks in the middle of the
+    K_Hbeta is that of the contact analysis under the torque as it stands; 1 on one slice. ISO 6336-1 has it under K_A
+    K_gamma K_v times the torque, where the load is more even as long as shafts do not bend: that of an analysis at this
+    torque can be given as `face_load_factor`. C_a is the relief of the flanks in the middle of the
     face.
 
     Raises:

@@ -171,7 +171,7 @@ class Rating(AbstractSettings):
         mesh_load_factor: K_gamma, uneven sharing between several meshes.
         dynamic_factor: K_v; by method B of ISO 6336-1 where it is not given.
         face_load_factor: K_Hbeta; by method C from `shaft_deflection` and `mesh_misalignment`, or else that of the
-            contact analysis, where it is not given.
+            contact analysis under the torque itself, where it is not given.
         shaft_deflection: f_sh, by bending and torsion of the pinion and its shaft over the face width, for method C.
         mesh_misalignment: f_ma, by manufacture over the face width, for method C.
         root_face_load_factor: K_Fbeta; by method B from K_Hbeta where it is not given.

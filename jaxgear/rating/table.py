@@ -1,12 +1,13 @@
 """The table [rating] of a design file."""
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 from ..conditions import LoadSpectrum
 from ..contact import MeshCycle, OperatingPoint
 from ..io.design_file import DesignFile
 from ..io.errors import DesignFileError, refused
-from ..io.table_keys import entry, nested, section_of, template_of
+from ..io.table_keys import FileTable, entry, nested, section_of, template_of
 from ..io.tables import FurtherTable
 from ..io.value_types import WEIGHTS, list_of, positive
 from ..metrics import Analysis, Finding, Quantity
@@ -23,7 +24,7 @@ _ROUNDED = 1e-6  # by which shares may miss their sum
 
 
 class GearRatingSection(section_of(GearRating, open=False)):  # type: ignore[misc]
-    """Material, surface and deviations of one gear for its rating; its quality class is that of the gear."""
+    """Material, surface and deviations of a gear for its rating; its quality class is that of the gear."""
 
     source = GearRating
 
@@ -32,7 +33,8 @@ class RatingSection(FurtherTable, section_of(Rating, (*_GEARS, "lubricant", "loa
     """How the pair is rated after ISO 6336: load factors, required safeties, load spectrum.
 
     Attributes:
-        pinion, wheel: materials, surfaces and deviations.
+        pinion, wheel: materials, surfaces and deviations, with the keys of [rating.gears].
+        gears: keys that both have in common, such as the material; a key of a gear itself counts before it.
         torques: on the pinion, of a load spectrum; the load of the file without it.
         weights: shares of the time at every torque, which sum to 1; equal shares without it.
         speeds: of the pinion at every torque; that of the file without it.
@@ -47,6 +49,7 @@ class RatingSection(FurtherTable, section_of(Rating, (*_GEARS, "lubricant", "loa
 
     pinion: GearRatingSection | None = entry(nested(GearRatingSection))
     wheel: GearRatingSection | None = entry(nested(GearRatingSection))
+    gears: GearRatingSection | None = entry(nested(GearRatingSection))
     torques: list[float] | None = entry(list_of(positive("N m")))
     weights: list[float] | None = entry(WEIGHTS)
     speeds: list[float] | None = entry(list_of(positive("rpm")))
@@ -102,11 +105,16 @@ class RatingSection(FurtherTable, section_of(Rating, (*_GEARS, "lubricant", "loa
         rating, analysis = self.settings(design), _analysis(design, cycle)
         return part(rating_of(analysis, rating), thermal_of(analysis, rating), rating, name, coast=design.coast)
 
+    @classmethod
+    def inner(cls) -> Mapping[str, type[FileTable]]:
+        """Keys that the gears have in common; the tables of each have the same keys."""
+        return {"[rating.gears]": GearRatingSection}
+
     def _gear(self, name: str, quality: int | None) -> GearRating:
-        section = getattr(self, name)
-        key = f"{self.table}.{name}"
-        if section is None:
+        key, said = f"{self.table}.{name}", [each for each in (self.gears, getattr(self, name)) if each is not None]
+        if not said:
             raise DesignFileError(key, "missing, the table of the material and the surface of the gear")
+        section = GearRatingSection(key, **{field: value for each in said for field, value in each.fields.items()})
         for needed, why in _NEEDED:
             if all(getattr(section, each) is None for each in needed):
                 raise DesignFileError(f"{key}.{needed[0]}", f"missing, {why}")
