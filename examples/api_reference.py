@@ -12,8 +12,8 @@ PACKAGE = Path(__file__).parent.parent / "jaxgear"
 # in the order of the pipeline; what they import from one another stands on the page of its owner
 PACKAGES = (
     "geometry microgeometry compliance compliance.finite_element contact shafts metrics tolerance conditions "
-    "revolution dynamics rating dimensionless wear manufacture sizing sweeps optimize layout io studies report "
-    "identification rexs plot numerics"
+    "revolution dynamics rating dimensionless wear manufacture planetary sizing sweeps optimize layout io studies "
+    "report identification rexs plot numerics"
 ).split()
 _NAMES = re.compile(r" +(?:\w+, )+\w+:")  # with which a line of a docstring begins
 

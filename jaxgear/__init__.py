@@ -19,7 +19,7 @@ The pipeline in reading order, every step differentiable and vmappable:
 The rest lives in the namespaces `jaxgear.geometry`, `compliance`, `contact`, `tolerance`, `conditions`, `metrics`,
 `revolution`, `sizing`, `sweeps`, `optimize`, `dynamics`, `wear`, `shafts`, `studies`, `plot` and `io`,
 with their `Abstract...` classes as extension points. Applications that none of these knows, such as `jaxgear.layout`,
-`jaxgear.manufacture`, `jaxgear.identification` and `jaxgear.rexs`, are imported by name; see `jaxgear.provided`.
+`jaxgear.manufacture`, `jaxgear.planetary` and `jaxgear.rexs`, are imported by name; see `jaxgear.provided`.
 
 Units: mm for geometry, um for modifications and transmission error, N, N m (on the pinion), MPa, degrees in
 constructors.

@@ -43,6 +43,7 @@ ORDER = (
     "rating",
     "identification",
     "layout",
+    "planetary",
     "manufacture",
     "rexs",
 )

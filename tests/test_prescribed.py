@@ -8,7 +8,7 @@ from catalogue import SLIDING, gear_pair
 
 import jaxgear as jg
 from jaxgear.contact import removed_material
-from jaxgear.contact.prescribed import _solve_at
+from jaxgear.contact.prescribed import solve_at_material
 
 TORQUE = 50.0
 
@@ -45,7 +45,7 @@ def test_error_of_a_torque_takes_its_force(mesh, cycle, error_of_teeth):
 def test_pairs_share_the_force_at_the_approach_of_teeth_and_bodies_together(mesh, cycle):
     """The error of the cycle itself, with the wind-up of the bodies as a compliance that couples the pairs."""
     removed = removed_material(mesh, TORQUE, pinion=jg.TipRelief(6.9, 3.4))
-    found = _solve_at(mesh, cycle.transmission_error, removed, mesh.hub / mesh.pair.face_width)
+    found = solve_at_material(mesh, cycle.transmission_error, removed, mesh.hub / mesh.pair.face_width)
     np.testing.assert_allclose(found.pair_force, cycle.pair_force, rtol=1e-9, atol=1e-7)
     np.testing.assert_allclose(np.sum(found.pair_force, axis=0), found.force, rtol=1e-12)
     np.testing.assert_allclose(found.tangent_stiffness, cycle.tangent_stiffness, rtol=1e-9)

@@ -90,14 +90,16 @@ def solve_at(
     error = jnp.broadcast_to(error.astype(torque.dtype), (positions,))
 
     def first_contact(removed):
-        contact = _solve_at(prepared, error, removed)
+        contact = solve_at_material(prepared, error, removed)
         return contact.line_load, contact.residual
 
-    return _solve_at(prepared, error, loaded_material(mesh, torque, *flanks, first_contact))
+    return solve_at_material(prepared, error, loaded_material(mesh, torque, *flanks, first_contact))
 
 
 @program
-def _solve_at(mesh: Mesh, approach: Curve, removed: RemovedMaterial, shared: Scalar | None = None) -> PrescribedContact:
+def solve_at_material(
+    mesh: Mesh, approach: Curve, removed: RemovedMaterial, shared: Scalar | None = None
+) -> PrescribedContact:
     """Contact at a prescribed approach of the teeth; of a mesh of one slice with a shared compliance [um/N] in series.
 
     Its deflection is then part of the approach and of the tangent stiffness, not of the transmission error.
@@ -169,11 +171,11 @@ def solve_series(mesh: Mesh, approach: Curve, removed: RemovedMaterial, complian
     """
     shared = mesh.hub / mesh.pair.face_width + compliance
     if mesh.resolution.slices == 1:  # a compliance that couples all pairs: one solution is enough
-        found = _solve_at(mesh, approach, removed, shared)
+        found = solve_at_material(mesh, approach, removed, shared)
         return SeriesContact(found.force, found.tangent_stiffness, found.transmission_error, found.status)
 
     def step(error, _):
-        found = _solve_at(mesh, error, removed)
+        found = solve_at_material(mesh, error, removed)
         softened = 1 + shared * found.tangent_stiffness
         missed = approach - error - shared * found.force
         stiffness = found.tangent_stiffness / softened

@@ -1,0 +1,29 @@
+"""Planetary stages: loaded contact of all meshes of sun, planets and ring, in equilibrium with their supports.
+
+gears = StageGears(26, 19, 64, module=3.0)
+stage = PlanetaryStage(gears, 3, radial_pin_stiffness=400.0, tangential_pin_stiffness=400.0, sun_support=0.0)
+prepared = prepare_stage(stage, sun=jaxgear.prepare(sun_planet), ring=jaxgear.prepare(planet_ring))
+cycle = solve_stage(prepared, 400.0, planet_to_sun=jaxgear.TipRelief(10.0, 4.0))
+cycle.load_sharing_factor, cycle.orders(6).amplitude
+"""
+
+from .cycle import StageCycle as StageCycle
+from .gears import StageGears as StageGears
+from .kinematics import Members as Members
+from .kinematics import Phasing as Phasing
+from .kinematics import gear_ratio as gear_ratio
+from .kinematics import member_speeds as member_speeds
+from .kinematics import member_torques as member_torques
+from .kinematics import mesh_frequency as mesh_frequency
+from .kinematics import output_member as output_member
+from .kinematics import phasing as phasing
+from .kinematics import planet_phases as planet_phases
+from .meshes import AbstractLoadedMesh as AbstractLoadedMesh
+from .meshes import AbstractPlacedMesh as AbstractPlacedMesh
+from .meshes import AbstractStageMesh as AbstractStageMesh
+from .meshes import MeshForces as MeshForces
+from .meshes import TableMesh as TableMesh
+from .solve import PreparedStage as PreparedStage
+from .solve import prepare_stage as prepare_stage
+from .solve import solve_stage as solve_stage
+from .stage import PlanetaryStage as PlanetaryStage

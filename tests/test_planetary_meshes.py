@@ -1,0 +1,86 @@
+"""Planetary stages with prepared meshes. External pairs stand for both meshes: the equilibrium makes no difference."""
+
+from functools import cache
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from catalogue import LINE, gear_pair, prepare, solve
+
+import jaxgear as jg
+from jaxgear.planetary import PlanetaryStage, StageGears, prepare_stage, solve_stage
+
+PLANETS, PIN, FORCE = 4, 500.0, 3000.0
+RELIEF = jg.TipRelief(6.0, 4.0)
+
+
+@cache
+def mesh_of(*teeth):
+    return prepare(gear_pair(teeth, bores=(None, None)), resolution=LINE)
+
+
+def prepared(sun, ring=60):
+    own = PlanetaryStage(
+        StageGears(sun, (ring - sun) // 2, ring, module=3.0),
+        PLANETS,
+        radial_pin_stiffness=PIN,
+        tangential_pin_stiffness=PIN,
+        sun_support=1000.0,
+        tangential_pin_error=jnp.zeros(PLANETS),
+    )
+    return prepare_stage(own, sun=mesh_of(sun, 18), ring=mesh_of(18, 60))
+
+
+def solved(stage, relief=RELIEF):
+    torque = PLANETS * FORCE * 1e-3 * stage.stage.gears.base_radius(stage.stage.gears.sun_teeth)
+    return solve_stage(stage, torque, planet_to_sun=relief)
+
+
+def test_meshes_in_phase_are_springs_in_series():
+    """24/18/60: all planets at one phase and the ring's mesh half a base pitch later. The stage is then the two pairs
+    under a planet's share of the load, its pin with 2 cos(alpha) on either side, and the wind-up of sun and ring."""
+    stage = prepared(24)
+    cycle = solved(stage)
+    assert cycle.converged.all() and cycle.residual.max() < 1e-9
+    np.testing.assert_allclose(cycle.load_share, 1.0, atol=1e-9)
+    errors = []
+    for teeth, flanks in (((24, 18), {"wheel": RELIEF}), ((18, 60), {})):
+        mesh = mesh_of(*teeth)
+        pair = solve(mesh, FORCE * 1e-3 * mesh.pair.pinion.base_radius, **flanks)
+        errors.append(np.asarray(pair.transmission_error - mesh.hub * pair.force / mesh.pair.face_width))
+        assert np.isclose(pair.phase[0], 0.0)
+    pins = (2 * np.cos(np.deg2rad(20))) ** 2 * FORCE / PIN
+    windup = float(stage.sun.windup + stage.ring.windup) * PLANETS * FORCE
+    assert windup > 0.1
+    expected = errors[0] + np.roll(errors[1], -LINE.positions // 2) + pins + windup
+    np.testing.assert_allclose(cycle.transmission_error, expected, atol=1e-7)
+
+
+def test_counter_phased_planets_suppress_odd_harmonics():
+    """26/18/62 and four planets, with the forces of equal planets at their own phases."""
+    cycle = solved(prepared(26, 62))
+    assert cycle.converged.all()
+    np.testing.assert_allclose(cycle.mean_load_share, 1.0, atol=1e-6)
+    odd, even = np.asarray(cycle.orders(4).amplitude)[::2], np.asarray(cycle.orders(4).amplitude)[1::2]
+    assert odd.max() < 1e-3 < 1e-2 < even.max()
+    np.testing.assert_allclose(cycle.sun_force[0], np.roll(cycle.sun_force[1], LINE.positions // 2), rtol=1e-9)
+
+
+@pytest.mark.slow
+def test_derivatives_by_relief_and_pin_error():
+    """K_gamma and PPTE against central differences."""
+    stage = prepared(26, 62)
+
+    def numbers(amount, late):
+        errors = jnp.zeros(PLANETS)
+        one = eqx.tree_at(lambda p: p.stage.tangential_pin_error, stage, errors)
+        cycle = solved(one, jg.TipRelief(amount, 4.0))
+        return jnp.stack([cycle.load_sharing_factor, jg.peak_to_peak(cycle.transmission_error)])
+
+    at, step = jnp.asarray([6.0, -15.0]), 1e-3
+    exact = jax.jit(jax.jacrev(lambda both: numbers(*both)))(at)
+    for column, direction in zip(exact.T, np.eye(2)):
+        there, back = (numbers(*(at + sign * step * direction)) for sign in (1, -1))
+        np.testing.assert_allclose(column, (there - back) / (2 * step), rtol=1e-4, atol=1e-6)
