@@ -36,6 +36,7 @@ from .geometry import STEEL as STEEL
 from .geometry import Gear as Gear
 from .geometry import GearPair as GearPair
 from .geometry import Material as Material
+from .geometry import RingGear as RingGear
 from .geometry import explain as explain
 from .geometry import margins as margins
 from .geometry import path_of_contact as path_of_contact

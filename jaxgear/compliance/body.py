@@ -44,7 +44,7 @@ class AbstractBody(Checked):
         """`compliance` of driving and driven gear, each in several planes; `known` is the result of `of_gears`."""
         first, second = (
             jnp.stack([self.compliance(load, step, plane) for plane in planes])
-            for load, step in ((pinion, +1), (wheel, -1))
+            for load, step in ((pinion, +1), (wheel, step_of(wheel)))
         )
         return first, second
 
@@ -59,8 +59,13 @@ class AbstractBody(Checked):
         """
 
 
+def step_of(wheel: ToothLoad) -> int:
+    """`step` of a driven gear: a ring gear turns the way of its planet."""
+    return +1 if wheel.outline.gear.is_internal else -1
+
+
 class ElasticRing(AbstractBody):
-    """Elastic ring fixed at the bore, with exact coupling of neighbouring teeth (see `ring`).
+    """Elastic ring with exact coupling of neighbouring teeth (see `ring`), fixed at the bore or the rim of a ring gear.
 
     Attributes:
         hub_windup: include the torsion of the ring between bore and root circle. It is common to all teeth: it shifts
@@ -87,7 +92,7 @@ class ElasticRing(AbstractBody):
             modulus = jnp.stack([plane_modulus(load.outline.gear.material, plane) for plane in planes])
             return jax.vmap(partial(self._between_teeth, load, step))(modulus, arcs)
 
-        return on_both(of_one, (pinion, +1, known[0]), (wheel, -1, known[1]))
+        return on_both(of_one, (pinion, +1, known[0]), (wheel, step_of(wheel), known[1]))
 
     def compliance(self, load: ToothLoad, step: int, plane: Plane) -> Float[Array, "pairs pairs positions"]:
         (arcs,) = self._arcs(load.outline, load.angle.shape[0], (plane,))
@@ -100,7 +105,9 @@ class ElasticRing(AbstractBody):
         ratio = gear.root_circle_radius / gear.bore_radius
         poisson = jnp.stack([plane_poisson(gear.material, plane) for plane in planes])
         # one program for all planes: the ring's equations are most of what there is to compile
-        return jax.vmap(lambda of: ring.arc_compliance(angle, ratio, of, spacing, self.harmonics))(poisson)
+        return jax.vmap(
+            lambda of: ring.arc_compliance(gear.signed(angle), ratio, of, spacing, self.harmonics, gear.is_internal)
+        )(poisson)
 
     def _between_teeth(
         self, load: ToothLoad, step: int | Array, modulus: Array, blocks: Float[Array, "pairs 3 3"]
@@ -111,7 +118,7 @@ class ElasticRing(AbstractBody):
         arm = (load.height - outline.root_height) / gear.root_circle_radius
         cosine = jnp.cos(load.angle)
         modes = jnp.stack([-arm * cosine, cosine, -jnp.sin(load.angle)], axis=1)  # (pairs, 3, positions)
-        own = blocks[:1] - ring.relaxation(outline.root_half_angle)[None]
+        own = blocks[:1] - ring.relaxation(gear.signed(outline.root_half_angle))[None]
         blocks = jnp.concatenate([own, blocks[1:]])
         # the responding tooth i lies (i - j) steps from the loaded tooth j; K(-phi) = K(phi)^T
         order = np.arange(count)[:, None] - np.arange(count)[None]
@@ -129,7 +136,7 @@ class ElasticRing(AbstractBody):
         """
         gear, material = outline.gear, outline.gear.material
         ratio = gear.root_circle_radius / gear.bore_radius
-        torsion = (1 + material.poisson_ratio) * (ratio**2 - 1) / (2 * jnp.pi * material.elastic_modulus)
+        torsion = (1 + material.poisson_ratio) * gear.signed(ratio**2 - 1) / (2 * jnp.pi * material.elastic_modulus)
         value = 1e3 * torsion * (gear.base_radius / gear.root_circle_radius) ** 2
         if gear.helix_angle is not None:
             axial = axial_compliance(gear).deflection

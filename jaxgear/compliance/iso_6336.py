@@ -37,6 +37,7 @@ def iso_stiffness(pair: GearPair, line_load: Given = _LIGHT_LOAD) -> IsoStiffnes
     """Stiffness of ISO 6336-1 Method B, of helical gears with their virtual numbers of teeth and times cos(beta).
 
     Index 1 of its formulas is the gear with fewer teeth, whichever drives; of equal teeth that with more profile shift.
+    With a ring gear, 1 / z_n2 and the profile shift of the ring gear count as zero.
     The blank factor C_R = 1 + ln(b_s / b) / (5 exp(s_R / (5 m_n))) is that of gears with `rim_thickness` and
     `web_thickness`, within 0.2 <= b_s / b <= 1.2 and s_R >= m_n, else 1; of two gears it is the mean.
 
@@ -61,6 +62,8 @@ def single_stiffness(pair: GearPair, line_load: Scalar) -> tuple[Scalar, Scalar]
     of_pinion, of_wheel = ((gear.virtual_teeth, gear.profile_shift) for gear in pair.gears)
     z1, x1 = (jnp.where(more, other, own) for own, other in zip(of_pinion, of_wheel))
     z2, x2 = (jnp.where(more, own, other) for own, other in zip(of_pinion, of_wheel))
+    if wheel.is_internal:  # z_n2 is infinite, and its profile shift does not count
+        (z1, z2), (x1, x2) = (pinion.virtual_teeth, jnp.inf), (pinion.profile_shift, 0.0)
     c1, c2, c3, c4, c5, c6, c7, c8, c9 = _Q
     q = c1 + c2 / z1 + c3 / z2 + c4 * x1 + c5 * x1 / z1 + c6 * x2 + c7 * x2 / z2 + c8 * x1**2 + c9 * x2**2
     dedendum = 0.5 * (_tooth_dedendum(pinion) + _tooth_dedendum(wheel))

@@ -27,22 +27,31 @@ _HIGHEST_SHIFT = 3  # of a harmonic by the products of sines and cosines in the 
 
 
 def arc_compliance(
-    half_angle: Scalar, thickness_ratio: Scalar, poisson: Scalar, spacing: Float[Array, " k"], harmonics: int
+    half_angle: Scalar,
+    thickness_ratio: Scalar,
+    poisson: Scalar,
+    spacing: Float[Array, " k"],
+    harmonics: int,
+    internal: bool = False,
 ) -> Float[Array, "k 3 3"]:
     """K between two root arcs, without the ring's rigid torsion.
 
     Args:
         half_angle: half angle of the root arc, theta_f [rad].
-        thickness_ratio: root radius over bore radius, h.
+        thickness_ratio: root radius over the radius of the fixed circle, h: bore, or outer circle of an internal ring.
         poisson: Poisson's ratio of the plane problem.
         spacing: angles of the responding arc minus the loaded one [rad], shape (k,).
         harmonics: terms of the Fourier series; the error falls with (harmonics * half_angle)^-2.
+        internal: whether the ring carries its teeth inside and is fixed outside, h < 1.
 
     Returns:
         K times the plane modulus, dimensionless, shape (k, 3, 3), rows responding and columns loaded modes
         (moment, shear, normal).
     """
-    ring = _ring_compliance(thickness_ratio, poisson, harmonics)
+    ring = _ring_compliance(thickness_ratio, poisson, harmonics, internal)
+    uniform = _uniform_compliance(thickness_ratio, poisson)
+    if internal:  # the outward normal of the loaded circle points to the axis: stresses are minus the tractions
+        ring, uniform = -ring, -uniform
     modes = _arc_modes(half_angle, harmonics)
     order = jnp.arange(1, harmonics + 1, dtype=modes.dtype)
     pairs = jnp.einsum("ani,nij,bnj->abn", modes[:, 1:], ring, modes[:, 1:])
@@ -54,7 +63,7 @@ def arc_compliance(
     same = np.array([[1.0, 1.0, 0.0], [1.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
     cross = np.array([[0.0, 0.0, -1.0], [0.0, 0.0, -1.0], [1.0, 1.0, 0.0]])
     matrix = jnp.pi * (even * jnp.asarray(same, even.dtype)[None] + odd * jnp.asarray(cross, odd.dtype)[None])
-    breathing = 2 * jnp.pi * modes[2, 0, 0] ** 2 * _uniform_compliance(thickness_ratio, poisson)
+    breathing = 2 * jnp.pi * modes[2, 0, 0] ** 2 * uniform
     return matrix + breathing * jnp.asarray(np.diag([0.0, 0.0, 1.0]), breathing.dtype)[None]
 
 
@@ -119,15 +128,16 @@ def _arc_modes(half_angle: Scalar, harmonics: int) -> Float[Array, "3 n 2"]:
     return jnp.stack(rows) * jnp.asarray(scale, t.dtype)[None, :, None]
 
 
-def _ring_compliance(thickness_ratio: Scalar, poisson: Scalar, harmonics: int) -> Float[Array, "n 2 2"]:
+def _ring_compliance(thickness_ratio: Scalar, poisson: Scalar, harmonics: int, internal: bool) -> Float[Array, "n 2 2"]:
     """Displacements (u_r, u_theta) of the root circle per stresses (sigma_r, tau) of harmonic n = 1 ... harmonics.
 
-    Four Michell terms per harmonic; the decaying ones are scaled to their value at the bore so that no power overflows.
+    Four Michell terms per harmonic; those that decay from the bore to the root circle are scaled to their value at the
+    bore so that no power overflows. In an internal ring those are the terms that grow with the radius.
     """
     first = _first_harmonic(thickness_ratio, poisson)
     if harmonics == 1:
         return first
-    return jnp.concatenate([first, _higher_harmonics(thickness_ratio, poisson, harmonics)])
+    return jnp.concatenate([first, _higher_harmonics(thickness_ratio, poisson, harmonics, internal)])
 
 
 def _condense(bore: Array, outer_displacement: Array, outer_stress: Array, poisson: Array) -> Array:
@@ -138,11 +148,12 @@ def _condense(bore: Array, outer_displacement: Array, outer_stress: Array, poiss
     return (1 + poisson) * (outer_displacement @ amplitude)  # 1 / (2 mu) = (1 + nu) / E
 
 
-def _higher_harmonics(thickness_ratio: Array, poisson: Array, harmonics: int) -> Array:
+def _higher_harmonics(thickness_ratio: Array, poisson: Array, harmonics: int, internal: bool) -> Array:
     n = jnp.arange(2, harmonics + 1, dtype=thickness_ratio.dtype)
     kappa = (3 - poisson) / (1 + poisson)
     inner = 1 / thickness_ratio
-    fade = inner**n  # growing terms at the bore relative to the root circle, and decaying ones the other way round
+    # of every term from one circle to the other, where it decays
+    fade = inner**-n if internal else inner**n
     one = jnp.ones_like(n)
     displacement = jnp.stack(
         [
@@ -158,8 +169,9 @@ def _higher_harmonics(thickness_ratio: Array, poisson: Array, harmonics: int) ->
         ],
         -2,
     )
-    outer = jnp.stack([one, fade, one, fade], -1)[:, None]
-    bore = jnp.stack([fade * inner, inner * one, fade / inner, one / inner], -1)[:, None]
+    growing, decaying = (fade, one) if internal else (one, fade)
+    outer = jnp.stack([growing, decaying, growing, decaying], -1)[:, None]
+    bore = jnp.stack([decaying * inner, growing * inner, decaying / inner, growing / inner], -1)[:, None]
     return _condense(displacement * bore, displacement * outer, stress * outer, poisson)
 
 

@@ -83,7 +83,7 @@ def place_of(mesh: Mesh, torque: Scalar, line_load: Real | None = None) -> Place
     tips = (path > contact.end) & (contact.end_shortened <= 0), (path < contact.start) & (contact.start_shortened <= 0)
     beyond = jnp.where(tips[0], over[0], 0.0) - jnp.where(tips[1], over[1], 0.0)
     inside = [
-        jnp.maximum(side.tip_roll_length**2 - side.contact_roll_length**2, 0.0) / (2 * side.base_radius)
+        jnp.maximum((side.tip_roll_length**2 - side.contact_roll_length**2) / (2 * side.base_radius), 0.0)
         for side in (first, second)
     ]
     sides = _side(mesh, first, 1.0), _side(mesh, second, -1.0)
@@ -137,7 +137,7 @@ def flank_at(side: PlaceSide, moved: Real) -> Flank:
     """Points of one gear's flank at a distance from the nominal contact, towards the pinion tip [mm]."""
     roll_length = side.roll_length + moved * side.rate
     return Flank(
-        roll_length=jnp.where(roll_length > 0, roll_length, 0.0),
+        roll_length=jnp.where((roll_length > 0) == (side.base_radius > 0), roll_length, 0.0),
         tip_roll_length=side.tip_roll_length,
         start_roll_length=side.start_roll_length,
         base_radius=side.base_radius,

@@ -9,8 +9,8 @@ root, no table.
     S = x + rho_Q - rho_mate + r_b,mate tau,  tau = turn of that tangent away from the line of action.
 
 To second order S = x^2 rho_tip C / (2 rho_mate r_b,tip^2) with C = rho_tip + rho_mate, so the gap joins the path with
-zero slope. All differences are formed without cancellation, so single precision keeps 1e-4 um where contact is
-possible.
+zero slope. Of a ring gear, roll lengths and base radii are negative, and so is rho_Q where it is the mate. All
+differences are formed without cancellation, so single precision keeps 1e-4 um where contact is possible.
 
 Where the path ends at the form circle of an undercut tooth, there is no involute for the mate's tip corner to touch.
 Beyond that end it is the edge of the undercut that touches the mate's flank: the same closed form with the roles of the
@@ -38,8 +38,9 @@ from .resolution import Resolution
 
 Real = Float[Array, "..."]
 
-# Beyond this many base pitches outside the path the gap is hundreds of um; it goes on along its tangent there.
-REACH = 0.4
+# Beyond this many base pitches outside the path the gap is hundreds of um; it goes on along its tangent there. Tips of
+# a planet stay close to the flank of a ring gear with few teeth more.
+REACH, _INTERNAL_REACH = 0.4, 1.5
 
 
 def corner_gap(
@@ -66,7 +67,7 @@ def corner_gap(
     change = (2 * mate_roll_length + du) * du + (2 * mate_base_radius + dv) * dv
     floor = (1e-3 * mate_base_radius) ** 2
     squared = jnp.maximum(mate_roll_length**2 + change, floor)
-    tangent = jnp.sqrt(squared)
+    tangent = jnp.copysign(jnp.sqrt(squared), mate_base_radius)
     growth = (squared - mate_roll_length**2) / (tangent + mate_roll_length)
     cross = mate_base_radius * (du - growth) - dv * tangent
     dot = (mate_roll_length + du) * tangent + (mate_base_radius + dv) * mate_base_radius
@@ -324,8 +325,9 @@ def _ends(pair: GearPair, contact: PathOfContact, path: Real) -> tuple[_End, _En
         (contact.pinion_roll_length(place), contact.wheel_roll_length(place)) for place in (contact.start, contact.end)
     )
     # the edge of an undercut passes the tip of the mate about as far outside the path as this is shortened
+    reach = _INTERNAL_REACH if pair.wheel.is_internal else REACH
     start, end = (
-        (shortened > 0, REACH * contact.base_pitch + shortened)
+        (shortened > 0, reach * contact.base_pitch + shortened)
         for shortened in (contact.start_shortened, contact.end_shortened)
     )
     approach = pair.wheel.tip_roll_length, wheel_base, first, pinion_base
@@ -368,7 +370,7 @@ def _corner(end: _End, edge_radius: Scalar) -> _Corner:
 
     def touching(x: Real) -> tuple[Real, Real]:
         gap, touched = end.touching(x)
-        past = jnp.maximum(touched**2 - tip**2, 0.0) / (2 * tip_base)  # the tip, along the flank
+        past = jnp.maximum((touched**2 - tip**2) / (2 * tip_base), 0.0)  # the tip, along the flank
         opened = 1e3 * (jnp.sqrt(past**2 + rounding**2) - rounding)
         return jnp.where(end.at_form, gap + opened, gap), end.on_flank(touched)
 

@@ -195,7 +195,7 @@ class Mesh(eqx.Module):
     def _flank(self, side: Side, offset: Given) -> Flank:
         rho = side.contact_roll_length
         # arc length of an involute: ds = rho / r_b d rho
-        moved = jnp.maximum(rho + offset * side.base_radius / rho, 0.0)
+        moved = side.gear.signed(jnp.maximum(side.gear.signed(rho + offset * side.base_radius / rho), 0.0))
         return side.flank(moved, (self.face_coordinate + side.face_middle)[None, :, None])
 
 

@@ -39,6 +39,7 @@ from .pair import pair_geometry as pair_geometry
 from .pair import path_of_contact as path_of_contact
 from .path import PathOfContact as PathOfContact
 from .path import reduced_radius as reduced_radius
+from .ring_gear import RingGear as RingGear
 from .thickness import Measures as Measures
 from .thickness import ToothThickness as ToothThickness
 from .thickness import allowance_of_balls as allowance_of_balls

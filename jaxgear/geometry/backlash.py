@@ -85,7 +85,7 @@ def _distance(pinion: Gear, wheel: Gear, backlash: Scalar) -> Scalar:
     """Centre distance [mm] at which two gears have a backlash [um]."""
     both = pinion.base_radius + wheel.base_radius
     opened = 0.5e-3 * (backlash + thickening(pinion, wheel)) / both
-    return both / jnp.cos(pressure_angle_of(backlash_free_involute(pinion, wheel) + opened))
+    return wheel.signed(both) / jnp.cos(pressure_angle_of(backlash_free_involute(pinion, wheel) + opened))
 
 
 def _check_enough(backlash: Scalar, play: Scalar) -> None:

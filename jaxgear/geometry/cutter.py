@@ -81,6 +81,13 @@ class Cutter(NamedTuple):
         return self.line_length - own - self.rounding
 
     @property
+    def involute_radius(self) -> Number:
+        """Radius of the cutter at which its involute ends and its rounding begins [mm]."""
+        of = _library(self.base_radius)
+        own = of.sqrt(of.maximum(self.center_radius**2 - self.base_radius**2, (1e-6 * self.base_radius) ** 2))
+        return of.sqrt(self.base_radius**2 + (own + self.rounding) ** 2)
+
+    @property
     def tip_half_width(self) -> Number:
         """Half the tip width between its roundings, as an arc through their centres [mm]; 0 for a tip of one arc."""
         return self.center_radius * (self.pitch_angle - self.gap_angle)
@@ -109,8 +116,7 @@ def rolling(
     of = _library(module)
     alpha = of.deg2rad(pressure_angle)
     tangent, cosine = of.tan(alpha), of.cos(alpha)
-    wanted = _involute(tangent) + 2 * tangent * (generating_shift + cutter_shift) / (teeth + cutter_teeth)
-    working = _tangent_of(wanted)
+    working = _generating_tangent(teeth, cutter_teeth, tangent, generating_shift + cutter_shift)
     secant = of.sqrt(1 + working**2)
     reference, base = 0.5 * module * cutter_teeth, 0.5 * module * cutter_teeth * cosine
     gear_base = 0.5 * module * teeth * cosine
@@ -133,6 +139,24 @@ def rolling(
         gap,
         np.pi / cutter_teeth,
     )
+
+
+def generating_center_distance(teeth: Number, cutter_teeth: Number, alpha: Number, shift: Number) -> Number:
+    """Generating centre distance a_0 of a spur gear and its cutter, in modules; negative for an internal gear.
+
+    Args:
+        teeth, cutter_teeth: numbers of teeth z and z_0.
+        alpha: pressure angle [rad].
+        shift: sum of the profile shift coefficients x_E of the gear and x_0 of the cutter.
+    """
+    of = _library(alpha)
+    working = _generating_tangent(teeth, cutter_teeth, of.tan(alpha), shift)
+    return 0.5 * (teeth + cutter_teeth) * of.cos(alpha) * of.sqrt(1 + working**2)
+
+
+def _generating_tangent(teeth: Number, cutter_teeth: Number, tangent: Number, shift: Number) -> Number:
+    """tan(alpha_w0) with inv(alpha_w0) = inv(alpha) + 2 tan(alpha) (x_E + x_0) / (z + z_0)."""
+    return _tangent_of(_involute(tangent) + 2 * tangent * shift / (teeth + cutter_teeth))
 
 
 def full_rounding(cutter_teeth: Number, pressure_angle: Number, cutter_shift: Number, height: Number) -> Number:

@@ -1,10 +1,11 @@
 """Involute relations in the roll length rho = sqrt(r^2 - r_b^2) [mm] (ISO 21771).
 
 With t = rho / r_b = tan(alpha_y) the involute function is inv(alpha_y) = t - atan(t): no inverse cosine, so values and
-derivatives stay finite at the base circle.
+derivatives stay finite at the base circle. Of a ring gear, radii and roll lengths are negative, as in ISO 21771: the
+formulas of external gears then hold for it unchanged.
 """
 
-from typing import Protocol
+from typing import Any, Protocol
 
 import jax.numpy as jnp
 from jaxtyping import Array, Float
@@ -36,6 +37,8 @@ class Toothed(Protocol):
     @property
     def thickness_angle(self) -> Scalar: ...
 
+    def signed(self, value: Any) -> Any: ...
+
 
 def involute(tangent: Real) -> Real:
     """Involute function inv(alpha) [rad] from tan(alpha)."""
@@ -45,7 +48,8 @@ def involute(tangent: Real) -> Real:
 def half_tooth_angle(gear: Toothed, rho: Real) -> Real:
     """Angle between the tooth centreline and the involute at a roll length [mm], seen from the gear centre [rad]."""
     alpha, transverse = jnp.deg2rad(gear.pressure_angle), gear.transverse_pressure_angle
-    at_base = (jnp.pi / 2 + 2 * gear.profile_shift * jnp.tan(alpha)) / gear.teeth + involute(jnp.tan(transverse))
+    pitch = (jnp.pi / 2 + 2 * gear.profile_shift * jnp.tan(alpha)) / gear.signed(gear.teeth)
+    at_base = pitch + involute(jnp.tan(transverse))
     return at_base + gear.thickness_angle - involute(rho / gear.base_radius)
 
 
@@ -59,12 +63,12 @@ def load_angle(gear: Toothed, rho: Real) -> Real:
 
 def tooth_thickness(gear: Toothed, diameter: Given) -> Real:
     """Thickness of the tooth as an arc [mm] on a diameter [mm] not below the base circle."""
-    return half_tooth_angle(gear, roll_length(gear, diameter)) * diameter
+    return half_tooth_angle(gear, roll_length(gear, diameter)) * gear.signed(diameter)
 
 
 def roll_length(gear: Toothed, diameter: Given) -> Real:
-    """Roll length [mm] of the involute point on a diameter [mm]; 0 below the base circle."""
-    return safe_sqrt((0.5 * diameter) ** 2 - gear.base_radius**2)
+    """Roll length [mm] of the involute point on a diameter [mm]; 0 below the base circle, negative for a ring gear."""
+    return gear.signed(safe_sqrt((0.5 * diameter) ** 2 - gear.base_radius**2))
 
 
 def roll_angle(gear: Toothed, rho: Given) -> Real:

@@ -99,7 +99,8 @@ class Curves(NamedTuple):
 
     def involute(self, rho: Real) -> tuple[Real, Real]:
         """Point (x, y) [mm] of the involute at a roll length [mm]."""
-        r, gamma = jnp.sqrt(self.base_radius**2 + rho**2), self.half_angle(rho)
+        # with the sign of the base radius
+        r, gamma = self.base_radius * jnp.sqrt(1 + (rho / self.base_radius) ** 2), self.half_angle(rho)
         return r * jnp.sin(gamma), r * jnp.cos(gamma)
 
 
@@ -151,6 +152,8 @@ def outline(gear: Gear) -> Outline:
     alpha, drawn = _generating_angle(gear), curves(gear)
     end_x, end_y = drawn.trochoid(jnp.full_like(alpha, jnp.pi / 2))
     tangential = _tangential_form_roll_length(gear)
+    if gear.is_internal:  # no cutter undercuts a ring gear: its involute ends at the base circle, inside the tip
+        return Outline(gear, drawn, alpha, tangential, jnp.arctan(end_x / end_y), jnp.zeros_like(alpha))
     # at the limit of undercut both junctions lie on the base circle; rounding must not choose between them
     undercut = tangential < -8 * jnp.finfo(tangential.dtype).eps * gear.pitch_radius
     at_base = bracketed_root(_height_above_base, alpha, jnp.full_like(alpha, jnp.pi / 2), drawn)

@@ -27,7 +27,7 @@ class GearPair(Checked):
 
     Attributes:
         pinion: driving gear.
-        wheel: driven gear.
+        wheel: driven gear; a `RingGear` for an internal pair, whose pinion is a planet.
         center_distance: operating centre distance [mm]; None for the backlash-free centre distance of the nominal tooth
             thicknesses, at which tooth thickness allowances add backlash. A concrete centre distance that is too small
             by no more than the rounding of its digits, of the profile shifts and of the helix angle is replaced by the
@@ -53,6 +53,8 @@ class GearPair(Checked):
                 raise ValueError(
                     f"GearPair: {name} holds gears of shape {gear.teeth.shape}, must be one; make many with jax.vmap"
                 )
+        if self.pinion.is_internal:
+            raise ValueError("GearPair: pinion is a RingGear, which must be the wheel, whichever gear drives")
         if self.center_distance is not None and not _traced(self):
             object.__setattr__(self, "center_distance", _unrounded(self, self.center_distance))
         for fault in _faults(self):
@@ -68,7 +70,8 @@ class GearPair(Checked):
         """Operating centre distance, given or backlash-free [mm]."""
         if self.center_distance is not None:
             return self.center_distance
-        return (self.pinion.base_radius + self.wheel.base_radius) / jnp.cos(self.working_pressure_angle)
+        both = self.wheel.signed(self.pinion.base_radius + self.wheel.base_radius)
+        return both / jnp.cos(self.working_pressure_angle)
 
     @property
     def backlash(self) -> Scalar:
@@ -241,12 +244,13 @@ def _unrounded(pair: GearPair, center_distance: Scalar) -> Scalar:
     if _traced(known) or held["backlash"] or not held["base_circle_clearance"]:
         return center_distance
     given, free = float(center_distance), float(_free_distance(pair.pinion, pair.wheel))
-    if free - given > rounded_by(pair.pinion, pair.wheel, center_distance):
+    if abs(free - given) > rounded_by(pair.pinion, pair.wheel, center_distance):
         return center_distance
     _LOG.warning(
-        "GearPair: center_distance = %.10g mm is less than the backlash-free one by no more than the rounding of the "
+        "GearPair: center_distance = %.10g mm is %s than the backlash-free one by no more than the rounding of the "
         "given digits: %.10g mm is taken, without backlash",
         given,
+        "more" if pair.wheel.is_internal else "less",
         free,
     )
     return real(free)

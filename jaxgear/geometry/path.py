@@ -81,7 +81,7 @@ def reduced_radius(first: Real, second: Real) -> Real:
 def working_pressure_angle(pinion: Gear, wheel: Gear, center_distance: Real | None) -> Real:
     """Operating pressure angle [rad] at a centre distance [mm], or without backlash (None)."""
     if center_distance is not None:
-        ratio = (pinion.base_radius + wheel.base_radius) / center_distance
+        ratio = wheel.signed(pinion.base_radius + wheel.base_radius) / center_distance
         # the clip keeps a traced, impossible centre distance finite; a concrete one has been refused
         return jnp.arccos(jnp.minimum(ratio, 1.0 - 1e-6))
     return pressure_angle_of(backlash_free_involute(pinion, wheel))
@@ -96,7 +96,7 @@ def pressure_angle_of(target: Real) -> Real:
 def backlash_free_involute(pinion: Gear, wheel: Gear) -> Real:
     """inv(alpha_wt) = inv(alpha_t) + 2 tan(alpha_n) (x1 + x2) / (z1 + z2) [rad] (ISO 21771)."""
     tangent = jnp.tan(jnp.deg2rad(pinion.pressure_angle))
-    shift = (pinion.profile_shift + wheel.profile_shift) / (pinion.teeth + wheel.teeth)
+    shift = (pinion.profile_shift + wheel.profile_shift) / (pinion.teeth + wheel.signed(wheel.teeth))
     return involute(jnp.tan(pinion.transverse_pressure_angle)) + 2 * tangent * shift
 
 

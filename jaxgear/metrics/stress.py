@@ -118,7 +118,8 @@ def contact_ratio_square(contact_ratio: Scalar, overlap_ratio: Scalar) -> Scalar
 Real = Float[Array, "..."]
 Load = Float[Array, "pairs slices positions"]
 
-_TANGENT = jnp.pi / 6  # of the critical section, against the centreline [rad]
+# inclination of the tangent at the critical section to the centreline, of external and of ring gears [rad]
+_TANGENT, _RING_TANGENT = jnp.pi / 6, jnp.pi / 3
 _SECTION_STEPS = 8  # fixed-point steps of ISO 6336-3 for theta; it gains two digits per step
 NOTCH_LIMITS = (1.0, 8.0)  # validity of Y_S in the notch parameter q_s
 _OBLIQUE, _MOST_OBLIQUE = 120.0, 30.0  # deg; Y_beta = 1 - eps_beta beta / 120 deg, beta at most 30 deg
@@ -177,10 +178,14 @@ class NominalRootStress(Checked):
 
 
 def critical_section(gear: Gear) -> CriticalSection:
-    """Section of the generated root at the 30 degree tangent, in the normal section of helical gears."""
+    """Section of the generated root at the 30 degree tangent, of ring gears the 60 degree one.
+
+    That of helical gears is in the normal section.
+    """
     gear = _of_normal_section(gear)
     if gear.cutter is not None:
-        return _section_by_cutter(curves(gear))
+        tangent = _RING_TANGENT if gear.is_internal else _TANGENT
+        return _section_by_cutter(curves(gear), jnp.full_like(gear.module, tangent))
     m, z = gear.module, gear.teeth
     offset, below, radius = (length / m for length in rack_tip(gear))
     g, h = -below, 2 / z * offset - jnp.pi / 3
@@ -192,14 +197,14 @@ def critical_section(gear: Gear) -> CriticalSection:
     return CriticalSection(chord * m, fillet * m, depth * m)
 
 
-def _section_by_cutter(drawn: Curves) -> CriticalSection:
-    """Root section at the 30 degree tangent of the fillet, by a root search.
+def _section_by_cutter(drawn: Curves, tangent: Scalar) -> CriticalSection:
+    """Root section where the fillet has this inclination to the centreline [rad], by a root search.
 
     The radius of curvature is that of the roulette of the tip arc's centre (Euler and Savary) and of the arc:
     rho_F = rho_a0 + L^2 / (L + sin(g) / (1 / r_w + 1 / r_w0)), where the rack has r_w0 = infinity.
     """
-    low, high = (jnp.full_like(drawn.depth, end) for end in (_TANGENT, jnp.pi / 2))
-    g = bracketed_root(_beyond_tangent, low, high, drawn)
+    low = jnp.full_like(drawn.depth, _TANGENT)
+    g = bracketed_root(_beyond_tangent, low, jnp.full_like(low, jnp.pi / 2), (drawn, tangent))
     x, y = drawn.trochoid(g)
     reach, _ = drawn.cutter_contact(g)
     assert drawn.cutter_radius is not None
@@ -208,9 +213,10 @@ def _section_by_cutter(drawn: Curves) -> CriticalSection:
     return CriticalSection(2 * x, fillet, y)
 
 
-def _beyond_tangent(g: Real, drawn: Curves) -> Real:
+def _beyond_tangent(g: Real, given: tuple[Curves, Scalar]) -> Real:
     """Inclination of the fillet's tangent at the parameter g beyond that of the critical section [rad]."""
-    return g - drawn.cutter_contact(g)[1] - _TANGENT
+    drawn, tangent = given
+    return g - drawn.cutter_contact(g)[1] - tangent
 
 
 def _of_normal_section(gear: Gear) -> Gear:
