@@ -63,7 +63,8 @@ def single_stiffness(pair: GearPair, line_load: Scalar) -> tuple[Scalar, Scalar]
     z1, x1 = (jnp.where(more, other, own) for own, other in zip(of_pinion, of_wheel))
     z2, x2 = (jnp.where(more, own, other) for own, other in zip(of_pinion, of_wheel))
     if wheel.is_internal:  # z_n2 is infinite, and its profile shift does not count
-        (z1, z2), (x1, x2) = (pinion.virtual_teeth, jnp.inf), (pinion.profile_shift, 0.0)
+        z1, z2 = pinion.virtual_teeth, jnp.full_like(z1, jnp.inf)
+        x1, x2 = pinion.profile_shift, jnp.zeros_like(x1)
     c1, c2, c3, c4, c5, c6, c7, c8, c9 = _Q
     q = c1 + c2 / z1 + c3 / z2 + c4 * x1 + c5 * x1 / z1 + c6 * x2 + c7 * x2 / z2 + c8 * x1**2 + c9 * x2**2
     dedendum = 0.5 * (_tooth_dedendum(pinion) + _tooth_dedendum(wheel))
