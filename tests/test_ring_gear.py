@@ -13,7 +13,7 @@ import pytest
 import jaxgear as jg
 from jaxgear.compliance import default_compliance, ring
 from jaxgear.contact.kinematics import contacts
-from jaxgear.geometry import margins, outline, path_of_contact
+from jaxgear.geometry import allowance_of_balls, margins, measures, outline, over_balls, path_of_contact, span
 from jaxgear.geometry.interference import Tips, radial_assembly_clearance, trochoid_clearance
 
 # planet, ring gear: what is not that of the defaults
@@ -140,7 +140,7 @@ def test_ring_with_very_many_teeth_is_the_rack_of_an_external_wheel():
 
 
 def solved(pair, torque, mod):
-    mesh = jg.prepare(pair, compliance=default_compliance("stress"), resolution=jg.Resolution(positions=64))
+    mesh = jg.prepare(pair, compliance=default_compliance("stress"))
     return jg.solve(mesh, torque, pinion=mod[0], wheel=mod[1])
 
 
@@ -187,7 +187,7 @@ def test_derivatives(mode, double):
     def ppte(x):
         wheel = jg.RingGear(**both, **{**ring_gear, "rim_diameter": 236.4 + x[1]}, profile_shift=-x[0])
         pair = jg.GearPair(jg.Gear(**both, **planet, profile_shift=x[0]), wheel)
-        mesh = jg.prepare(pair, resolution=jg.Resolution(positions=8, pairs=3))
+        mesh = jg.prepare(pair, resolution=jg.Resolution(positions=8, pairs=4))
         cycle = jg.solve(mesh, 200.0, pinion=jg.TipRelief(10.0 + x[2], 4.0))
         return jg.peak_to_peak(cycle.transmission_error)
 
@@ -228,3 +228,13 @@ def test_backlash_shrinks_with_the_centre_distance():
     thin = jg.GearPair(PLANET, jg.RingGear(64, 3.0, face_width=20.0, tooth_thickness_allowance=-50.0))
     assert float(thin.backlash) == pytest.approx(50.0 * np.cos(np.deg2rad(20)), rel=1e-3)
     assert bool(margins(thin).valid)
+
+
+def test_measured_between_balls():
+    """64 teeth, balls of 5.25 mm: inv(alpha_M) = psi - D_M / d_b, M_i = d_b / cos(alpha_M) - D_M."""
+    between = over_balls(RING, 5.25)
+    assert float(between) == pytest.approx(184.21444, abs=6e-6)
+    assert float(allowance_of_balls(RING, 5.25, between)) == pytest.approx(0.0, abs=1e-6)
+    with pytest.raises(ValueError, match="between balls"):
+        span(RING, 5)
+    assert np.isnan(measures(RING).span) and float(measures(RING, ball=5.25).over_balls) == float(between)

@@ -5,7 +5,7 @@ derivatives stay finite at the base circle. Of a ring gear, radii and roll lengt
 formulas of external gears then hold for it unchanged.
 """
 
-from typing import Any, Protocol
+from typing import Protocol, TypeVar
 
 import jax.numpy as jnp
 from jaxtyping import Array, Float
@@ -14,6 +14,7 @@ from ..numerics import Given, safe_sqrt
 
 Real = Float[Array, "..."]
 Scalar = Float[Array, ""]
+Value = TypeVar("Value")
 
 
 class Toothed(Protocol):
@@ -37,7 +38,7 @@ class Toothed(Protocol):
     @property
     def thickness_angle(self) -> Scalar: ...
 
-    def signed(self, value: Any) -> Any: ...
+    def signed(self, value: Value) -> Value: ...
 
 
 def involute(tangent: Real) -> Real:

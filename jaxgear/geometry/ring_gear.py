@@ -9,7 +9,7 @@ from jaxtyping import Array, Float
 
 from ..numerics import concrete, number, real
 from .cutter import generating_center_distance
-from .gear import CHAMFER_ACCURACY, Gear, Shape, generating_shift, tip_faults
+from .gear import CHAMFER_ACCURACY, Gear, Shape, tip_faults
 
 Scalar = Float[Array, ""]
 Real = Float[Array, "*gears"]  # one number of each gear, where `jax.vmap` made many
@@ -76,8 +76,7 @@ class RingGear(Gear):
             return text.replace("rim_diameter=None", f"rim_diameter={float(known):.6g} mm (a rim of 3.5 modules)")
         return text
 
-    @property
-    def tool_height(self) -> Any:
+    def _tool_height(self) -> Any:
         """Addendum of the cutter that reaches the root circle, in modules."""
         of = np if isinstance(self.module, np.ndarray) else jnp
         assert self.cutter_teeth is not None and self.cutter_profile_shift is not None
@@ -85,9 +84,9 @@ class RingGear(Gear):
             -self.teeth,
             self.cutter_teeth,
             of.deg2rad(self.pressure_angle),
-            generating_shift(self) + self.cutter_profile_shift,
+            self._generating_shift() + self.cutter_profile_shift,
         )
-        root = -0.5 * self.teeth + generating_shift(self) - self.dedendum
+        root = -0.5 * self.teeth + self._generating_shift() - self.dedendum
         return distance - root - 0.5 * self.cutter_teeth - self.cutter_profile_shift
 
     @property
@@ -106,7 +105,7 @@ class RingGear(Gear):
         if self.tip_diameter is None:
             found["tip_diameter"] = self.module * (given - 2 * self.addendum)
         if self.rim_diameter is None:
-            deeper = generating_shift(self) - self.profile_shift
+            deeper = self._generating_shift() - self.profile_shift
             found["rim_diameter"] = self.module * (given - 2 * deeper + 2 * self.dedendum + 2 * _USUAL_RIM)
         return found
 

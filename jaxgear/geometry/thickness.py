@@ -55,6 +55,8 @@ def span(gear: Gear, teeth: int) -> Scalar:
         ValueError: unless k is a whole number from 1 to the number of teeth, where the anvils miss the involute, or for
             a face of a helical gear that is too narrow.
     """
+    if gear.is_internal:
+        raise ValueError("gear is a RingGear, which has no base tangent length: measure it between balls")
     most = concrete(gear.teeth)
     whole("teeth", teeth, 1, float("inf") if most is None else float(most))
     found = _span(gear, teeth)
@@ -91,6 +93,8 @@ def _across(gear: Gear, length: Scalar) -> Scalar:
 def over_balls(gear: Gear, ball: Given) -> Scalar:
     """Dimension over two balls M_dK [mm] in one transverse section, or over pins, which is the same for spur gears.
 
+    Between two balls of a ring gear, with its negative numbers of teeth and diameters.
+
     inv(alpha_Kt) = inv(alpha_t) + D_M / (z m_n cos(alpha_n)) - pi / (2 z) + 2 x tan(alpha_n) / z + E_sns / (m_n z); the
     centres of the balls lie on d_K = d_b / cos(alpha_Kt). M_dK = d_K + D_M for an even number of teeth; for an odd one
     the balls are half a pitch off the diameter, M_dK = d_K cos(pi / (2 z)) + D_M.
@@ -106,7 +110,7 @@ def over_balls(gear: Gear, ball: Given) -> Scalar:
     wanted, radius, touched = _ball(gear, ball)
     _check_ball(gear, ball, wanted, radius)
     _check_touched("ball", ball, " mm", touched, gear)
-    return 2 * radius * _offset(gear) + ball
+    return gear.signed(2 * radius * _offset(gear) + ball)
 
 
 def _ball(gear: Gear, ball: Given) -> tuple[Scalar, Scalar, Scalar]:
@@ -151,8 +155,9 @@ def measures(gear: Gear, teeth: Given | None = None, ball: Given | None = None) 
         return jnp.where((form <= length) & (length <= gear.tip_roll_length), found, jnp.nan)
 
     outside = (wanted > 0) & (centre - 0.5 * ball >= gear.root_circle_radius) & (centre + 0.5 * ball >= gear.tip_radius)
-    over = jnp.where(outside, 2 * centre * _offset(gear) + ball, jnp.nan)
-    fits = jnp.where(_across(gear, first) <= gear.face_width, first, jnp.nan)
+    over = jnp.where(outside, gear.signed(2 * centre * _offset(gear) + ball), jnp.nan)
+    can_span = jnp.asarray(not gear.is_internal) & (_across(gear, first) <= gear.face_width)
+    fits = jnp.where(can_span, first, jnp.nan)
     return Measures(teeth, missing(_half_span(gear, first), fits), ball, missing(touched, over))
 
 
@@ -188,11 +193,11 @@ def allowance_of_balls(gear: Gear, ball: Given, measured: Numbers) -> Float[Arra
     """
     check("ball", ball, "mm", low=0.0, open_low=True)
     measured = real(measured)
-    ratio = (measured - ball) / (2 * gear.base_radius * _offset(gear))
-    least = concrete(2 * gear.base_radius * _offset(gear) + ball)
+    ratio = (gear.signed(measured) - ball) / (2 * gear.base_radius * _offset(gear))
+    least = concrete(gear.signed(2 * gear.base_radius * _offset(gear) + ball))
     check("measured", measured, "mm", low=None if least is None else float(least), open_low=True)
     tangent = jnp.sqrt(ratio**2 - 1)
-    thicker = gear.module * gear.teeth * (involute(tangent) - _thick(gear, ball, 0.0))
+    thicker = gear.module * gear.signed(gear.teeth) * (involute(tangent) - _thick(gear, ball, 0.0))
     found, pitch = concrete(thicker), concrete(gear.base_pitch)
     if found is not None and pitch is not None and np.abs(found).max() > float(pitch):
         worst = np.argmax(np.abs(found))
@@ -205,7 +210,7 @@ def allowance_of_balls(gear: Gear, ball: Given, measured: Numbers) -> Float[Arra
 def _thick(gear: Gear, ball: Given, allowance: Given) -> Scalar:
     """inv(alpha_Kt) of a ball between the flanks of a gear with an allowance [mm]."""
     tangent = jnp.tan(jnp.deg2rad(gear.pressure_angle))
-    space = (jnp.pi / 2 - 2 * gear.profile_shift * tangent - allowance / gear.module) / gear.teeth
+    space = (jnp.pi / 2 - 2 * gear.profile_shift * tangent - allowance / gear.module) / gear.signed(gear.teeth)
     return _pitch_involute(gear) + ball / (2 * gear.base_radius * jnp.cos(gear.base_helix_angle)) - space
 
 

@@ -26,8 +26,10 @@ from . import gearbox
 from .errors import DesignFileError, join, naming, printable, refused
 from .flanks import check_files
 from .gears import (
+    AnyGear,
     GearSection,
     PairSection,
+    RingSection,
     both_classes,
     check_pitches,
     drawing_of,
@@ -72,6 +74,7 @@ class FileSection(FileTable):
     Attributes:
         pinion: the driving gear.
         wheel: the driven gear.
+        ring: a driven ring gear in place of the wheel; the pinion is then a planet.
         load: torque and speed.
         title: free text; the name of the file without it.
         materials: materials of gears and shafts, by name; "STEEL" is built in.
@@ -86,7 +89,8 @@ class FileSection(FileTable):
     """
 
     pinion: GearSection = entry(nested(GearSection), ...)
-    wheel: GearSection = entry(nested(GearSection), ...)
+    wheel: GearSection | None = entry(nested(GearSection))
+    ring: RingSection | None = entry(nested(RingSection))
     load: LoadSection = entry(nested(LoadSection), ...)
     title: str | None = entry(text())
     materials: dict[str, Template] | None = entry(table(nested(Material)))
@@ -98,6 +102,16 @@ class FileSection(FileTable):
     shafts: list[gearbox.ShaftSection] = entry(list_of(nested(gearbox.ShaftSection), empty=True), [])
     meshes: list[gearbox.MeshSection] = entry(list_of(nested(gearbox.MeshSection), empty=True), [])
     housing: gearbox.HousingSection | None = entry(nested(gearbox.HousingSection))
+
+    @property
+    def driven(self) -> AnyGear:
+        """Wheel or ring gear."""
+        given = [each for each in (self.wheel, self.ring) if each is not None]
+        if not given:
+            raise DesignFileError("wheel", "missing, this key is required")
+        if len(given) > 1:
+            raise DesignFileError("ring", "has no effect beside [wheel]: a pair has one driven gear")
+        return given[0]
 
 
 def file_section(further: Mapping[str, type[FurtherTable]]) -> type[FileSection]:
@@ -432,8 +446,8 @@ def _read(file: Path, content: dict[str, Any]) -> tuple[DesignFile, list[Further
         _check_coast(content, further, load.torque)
         load, coast = load.changed(torque=-load.torque), True
     materials = materials_of(top.materials)
-    gears = {"pinion": top.pinion, "wheel": top.wheel}
-    check_pitches(top.pinion, top.wheel)
+    gears = {"pinion": top.pinion, "wheel": top.driven}
+    check_pitches(*gears.values())
     pair = pair_of(top.pair, *(gear_template(section, materials) for section in gears.values()))
     flanks, unused = (
         {name: flank_of(section, folder, pair.fields[name], coast=side) for name, section in gears.items()}
@@ -459,7 +473,7 @@ def _read(file: Path, content: dict[str, Any]) -> tuple[DesignFile, list[Further
     uneven = [part.key for part in (*modifications, axes) if any(part.build(end).varies_along_face for end in ends)]
     if axes.key not in uneven:  # zeros are parallel axes
         axes = replace(axes, fields={})
-    torque, quality = float(usual.torque), quality_of(top.pinion, top.wheel)
+    torque, quality = float(usual.torque), quality_of(top.pinion, top.driven)
     sections = {name: cls.read(content[name], folder) for name, cls in further.items() if name in content}
     sections |= {name: with_quality(section, quality) for name, section in sections.items() if section.classified}
     tables: dict[str, Any] = {name: section.value for name, section in sections.items()}

@@ -5,7 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from ..geometry import Gear, GearPair, Material, ToothProfile, ToothThickness, drawn_gear, pair_with_backlash
+from ..geometry import Gear, GearPair, Material, RingGear, ToothProfile, ToothThickness, drawn_gear, pair_with_backlash
 from ..microgeometry import AbstractModification
 from ..numerics import Number, UnitKey, changed, fields_of
 from ..numerics import real as real_number
@@ -32,6 +32,7 @@ _WITHOUT_FLANKS = "modification", "coast_modification", "quality_class"
 _ThicknessKeys = section_of(ToothThickness, most=(("teeth_spanned", 1000),))
 _ProfileKeys = section_of(ToothProfile)
 _GearKeys = section_of(Gear, ("material", "tooth_thickness_allowance"))
+_RingKeys = section_of(RingGear, ("material",))
 
 _BACKLASH = Number("um", low=0.0)
 MATERIAL = either(text(), nested(Material), "the name of a material, or a table")
@@ -81,6 +82,24 @@ class GearSection(_ProfileKeys, _ThicknessKeys, _GearKeys):  # type: ignore[misc
     coast_modification: list[Template | FlankFileSection] | None = entry(_MODIFICATIONS)
 
 
+class RingSection(_RingKeys):  # type: ignore[misc, valid-type]
+    """A ring gear in place of the wheel, and the modifications of its flanks.
+
+    Attributes:
+        material, quality_class, modification, coast_modification: as of a gear.
+    """
+
+    source = RingGear
+
+    material: str | Template | None = entry(MATERIAL)
+    quality_class: int | None = entry(QUALITY_CLASS)
+    modification: list[Template | FlankFileSection] = entry(_MODIFICATIONS, [])
+    coast_modification: list[Template | FlankFileSection] | None = entry(_MODIFICATIONS)
+
+
+AnyGear = GearSection | RingSection
+
+
 class PairSection(section_of(GearPair, ("pinion", "wheel"))):  # type: ignore[misc]
     """Pinion (driving) and wheel (driven) on their centre distance.
 
@@ -99,7 +118,7 @@ def materials_of(given: Mapping[str, Template] | None) -> Materials:
     return {_STEEL: Template(Material, {}, "material"), **(given or {})}
 
 
-def flank_of(section: GearSection, folder: Path, gear: Template, *, coast: bool) -> list[Template]:
+def flank_of(section: AnyGear, folder: Path, gear: Template, *, coast: bool) -> list[Template]:
     """The modifications of the drive or coast flanks of a gear; paths begin in the folder."""
     own = section.coast_modification if coast else None
     given = section.modification if own is None else own
@@ -108,7 +127,7 @@ def flank_of(section: GearSection, folder: Path, gear: Template, *, coast: bool)
     return [flank_template(each, folder, base_radius) if isinstance(each, FlankFileSection) else each for each in given]
 
 
-def drawing_of(section: GearSection) -> dict[str, Any]:
+def drawing_of(section: AnyGear) -> dict[str, Any]:
     """Name of the material and measured tooth thickness of a gear as given in the file, by name and unit.
 
     Limits are a list of the lower and the upper one.
@@ -119,7 +138,7 @@ def drawing_of(section: GearSection) -> dict[str, Any]:
     return found | {UnitKey(name, units[name].unit): given[name] for name in names}
 
 
-def check_pitches(*sections: GearSection) -> None:
+def check_pitches(*sections: AnyGear) -> None:
     """Raise for a diametral pitch if either gear is helical: it could be transverse or normal."""
     for section in sections:
         if section.written.get("module") == PITCH and any(each.helix_angle for each in sections):
@@ -136,12 +155,14 @@ def fixed_gear(section: GearSection, materials: Materials) -> Gear:
     return _fixed(gear_template(section, materials))
 
 
-def gear_template(section: GearSection, materials: Materials) -> Template:
+def gear_template(section: AnyGear, materials: Materials) -> Template:
     """A gear without its modifications."""
-    gear = template_of(section, Gear, without=("material",))
-    drawn = {**template_of(section, ToothThickness).fields, **template_of(section, ToothProfile).fields}
+    gear = template_of(section, section.source, without=("material",))
     if section.material is not None:
         gear = gear.having(material=_material(f"{section.key}.material", section.material, materials))
+    if isinstance(section, RingSection):
+        return gear
+    drawn = {**template_of(section, ToothThickness).fields, **template_of(section, ToothProfile).fields}
     # without any measure of a drawing the gear is the library's: messages then name its own fields
     return replace(gear.having(**drawn), make=drawn_gear if drawn else Gear)
 
@@ -232,7 +253,7 @@ def longest_path(pair: GearPair, part: Template, bounds: Mapping[str, tuple[floa
     return changed(pair, **made)
 
 
-def quality_of(pinion: GearSection, wheel: GearSection) -> list[int] | None:
+def quality_of(pinion: GearSection, wheel: AnyGear) -> list[int] | None:
     """Flank tolerance classes of both gears; None if the gears have none."""
     given = {"pinion": pinion.quality_class, "wheel": wheel.quality_class}
     missing = [name for name, number in given.items() if number is None]

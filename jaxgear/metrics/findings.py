@@ -36,6 +36,7 @@ LIMITS = {
     "module": Usual(0.05, 100.0, "mm", "ISO 54 lists 1 to 50 mm, fine mechanics goes down to 0.1 mm"),
     "elastic modulus": _of_field(Material, "elastic_modulus"),
     "density": Usual(500.0, 25_000.0, "kg/m^3", "steel 7850 kg/m^3: is it in g/cm^3?"),
+    "rim thickness in modules": Usual(1.75, 30.0, "", "of a ring gear that is held all round its outer circle"),
     "bore to root diameter": Usual(0.1, 0.95, "", "a ring fixed at its bore, out of the usual proportions"),
     "face width in modules, plane stress": Usual(0.0, 20.0, "", 'wide teeth are in plane strain: plane = "auto"'),
     "face width in modules": Usual(2.0, 48.0, "", "range compared with finite elements; narrower contacts are softer"),
@@ -232,7 +233,9 @@ def _numbers(cycle: MeshCycle):
             ("module", where, gear.module),
             ("elastic modulus", where, gear.material.elastic_modulus),
             ("density", where, gear.material.density),
-            ("bore to root diameter", where, gear.bore_radius / gear.root_circle_radius),
+            ("rim thickness in modules", where, gear.body_thickness / gear.module)
+            if gear.is_internal
+            else ("bore to root diameter", where, gear.bore_radius / gear.root_circle_radius),
             ("tip edge radius in modules", where, gear.edge_radius / gear.module),
         ]
         form = getattr(cycle.margins, f"{where}_form_clearance")

@@ -11,7 +11,7 @@ from typing import Any, Self
 import numpy as np
 
 from ..contact import Mesh
-from ..geometry import Gear
+from ..geometry import Gear, RingGear
 from ..io import DesignFile, write_flanks
 from ..io.tables import FurtherTable
 from ..metrics import Finding
@@ -191,12 +191,18 @@ def _reduction(evaluations: side_by_side.Evaluations) -> float:
     return 100 * (1 - side_by_side.main(evaluations).metrics["ppte_um"] / before) if before else 0.0
 
 
-_DERIVED = "tip_diameter", "tip_form_diameter", "bore_diameter"  # computed from other numbers if not given
+_DERIVED = (
+    "tip_diameter",
+    "tip_form_diameter",
+    "bore_diameter",
+    "rim_diameter",
+)  # computed from other numbers if not given
 
 
 def _gear(gear: Gear, geometry: Mapping[str, Any]) -> dict[str, Any]:
     """Numbers of a gear, with computed values where the file gives none."""
-    data: dict[str, Any] = {"bore_given": gear.bore_diameter is not None}
+    fixed = gear.rim_diameter if isinstance(gear, RingGear) else gear.bore_diameter
+    data: dict[str, Any] = {"bore_given": fixed is not None}
     for part in (gear, gear.material):
         for name, field in fields_of(type(part)).items():
             key = key_of(name, field)

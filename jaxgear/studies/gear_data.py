@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from ..geometry import Gear, GearPair, Outline, PathOfContact, diameter, explicit, measures, pair_geometry
+from ..geometry import Gear, GearPair, Outline, PathOfContact, RingGear, diameter, explicit, measures, pair_geometry
 from ..geometry.gear import has_full_radius, tool_name
 from ..geometry.pair import PairGeometry
 from ..io import DesignFile
@@ -120,7 +120,7 @@ def gear_tables(data: Mapping[str, Mapping[str, Any]]) -> list[Table]:
     known = [key for key in (*_MEASURES, _CLASS, *_DEVIATIONS.values()) if any(key in gear for gear in drawn.values())]
     note = _TOLERANCE_NOTE if _CLASS in known else ""
     return [
-        _side_by_side(list(both["pinion"]), both, "gears"),
+        _side_by_side(list(both["pinion"] | both["wheel"]), both, "gears"),
         _side_by_side(list(geometry["pair"]), {"pair": geometry["pair"]}, "pair"),
         _side_by_side(known, drawn, "drawing data", note),
     ]
@@ -157,6 +157,7 @@ class _Mated(NamedTuple):
     backlash: Scalar
 
 
+_BORE, _RIM = UnitKey("bore_diameter", "mm"), UnitKey("rim_diameter", "mm")
 # the names of ISO 21771
 _GEAR: dict[UnitKey, Callable[[_Meshing], Scalar | None]] = {
     UnitKey("teeth"): lambda of: of.gear.teeth,
@@ -165,16 +166,16 @@ _GEAR: dict[UnitKey, Callable[[_Meshing], Scalar | None]] = {
     UnitKey("profile_shift_coefficient"): lambda of: of.gear.profile_shift,
     UnitKey("generating_profile_shift_coefficient"): lambda of: of.gear.generating_profile_shift,
     UnitKey("face_width", "mm"): lambda of: of.gear.face_width,
-    UnitKey("reference_diameter", "mm"): lambda of: 2 * of.gear.pitch_radius,
+    UnitKey("reference_diameter", "mm"): lambda of: of.gear.signed(2 * of.gear.pitch_radius),
     UnitKey("pitch_circle_diameter", "mm"): lambda of: diameter(of.gear, of.pitch),
-    UnitKey("base_diameter", "mm"): lambda of: 2 * of.gear.base_radius,
-    UnitKey("tip_diameter", "mm"): lambda of: 2 * of.gear.tip_radius,
-    UnitKey("tip_form_diameter", "mm"): lambda of: 2 * of.gear.tip_form_radius,
-    UnitKey("root_diameter", "mm"): lambda of: 2 * of.gear.root_circle_radius,
+    UnitKey("base_diameter", "mm"): lambda of: of.gear.signed(2 * of.gear.base_radius),
+    UnitKey("tip_diameter", "mm"): lambda of: of.gear.signed(2 * of.gear.tip_radius),
+    UnitKey("tip_form_diameter", "mm"): lambda of: of.gear.signed(2 * of.gear.tip_form_radius),
+    UnitKey("root_diameter", "mm"): lambda of: of.gear.signed(2 * of.gear.root_circle_radius),
     UnitKey("root_form_diameter", "mm"): lambda of: diameter(of.gear, of.outline.form_roll_length),
     UnitKey("active_root_diameter", "mm"): lambda of: diameter(of.gear, of.active[0]),
     UnitKey("active_tip_diameter", "mm"): lambda of: diameter(of.gear, of.active[1]),
-    UnitKey("bore_diameter", "mm"): lambda of: 2 * of.gear.bore_radius,
+    _BORE: lambda of: of.gear.signed(2 * of.gear.bore_radius),
     UnitKey("tip_land", "mm"): lambda of: of.gear.tip_land,
     UnitKey("tip_edge_radius", "mm"): lambda of: of.gear.edge_radius,
     UnitKey("tip_clearance", "mm"): lambda of: of.tip_clearance,
@@ -230,7 +231,7 @@ def gears(file: DesignFile) -> dict[str, dict[str, dict[str, Any]]]:
     pinion, wheel, together = jax.tree.map(lambda number: np.where(np.abs(number) < 1e-9, 0.0, number), shape)
     geometry = {
         "pinion": dict(zip(of_gear, pinion, strict=True)),
-        "wheel": dict(zip(of_gear, wheel, strict=True)),
+        "wheel": {_RIM if key == _BORE and pair.wheel.is_internal else key: of for key, of in zip(of_gear, wheel)},
         "pair": dict(zip(of_pair, together, strict=True)),
     }
     of = zip(("pinion", "wheel"), drawn, choices)
@@ -242,8 +243,12 @@ def mounting(file: DesignFile) -> str:
     shape = gears(file)["geometry"]
     texts = []
     for name, gear in (("pinion", file.pair().pinion), ("wheel", file.pair().wheel)):
-        guess = "" if gear.bore_diameter is not None else " (half the root diameter, as none is given)"
-        texts.append(f"{name} {float(shape[name]['bore_diameter_mm']):.4g} mm{guess}")
+        if isinstance(gear, RingGear):
+            guess = "" if gear.rim_diameter is not None else " (a rim of 3.5 modules, as none is given)"
+            texts.append(f"rim of the ring gear {float(shape[name][_RIM]):.5g} mm{guess}")
+        else:
+            guess = "" if gear.bore_diameter is not None else " (half the root diameter, as none is given)"
+            texts.append(f"{name} {float(shape[name][_BORE]):.4g} mm{guess}")
     full = [
         f"{name} {float(gear.root_radius):.4g} x module (full radius of the {tool_name(gear)})"
         for name, gear in (("pinion", file.pair().pinion), ("wheel", file.pair().wheel))
