@@ -14,7 +14,7 @@ import jaxgear as jg
 from jaxgear import dynamics
 from jaxgear.contact import removed_material, solve_removed
 from jaxgear.contact.mesh import half_way, prepare_from
-from jaxgear.dynamics.drive_and_coast import _coast_phase, coast_flanks
+from jaxgear.dynamics.force_map import _coast_phase, coast_flanks
 from jaxgear.dynamics.from_contact import interpolated
 from jaxgear.dynamics.integrate import one_cycle, steps_of
 from jaxgear.dynamics.oscillator import at_rest

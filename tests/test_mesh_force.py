@@ -14,7 +14,7 @@ from jaxgear.contact import removed_material, solve_removed
 from jaxgear.contact.mesh import prepare_from
 from jaxgear.contact.prescribed import solve_series
 from jaxgear.dynamics import mesh_force
-from jaxgear.dynamics.drive_and_coast import _coast_phase
+from jaxgear.dynamics.force_map import _coast_phase
 from jaxgear.geometry.involute import half_tooth_angle
 
 TORQUE = 30.0

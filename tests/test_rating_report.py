@@ -23,7 +23,7 @@ from jaxgear.rating.chain import Spectrum
 from jaxgear.rating.figures import woehler
 from jaxgear.rating.thermal import thermal_rating
 from jaxgear.report import write_report, write_tables
-from jaxgear.studies.comparison_result import ComparisonResult
+from jaxgear.studies.comparison import ComparisonResult
 
 ROOT = Path(__file__).parents[1]
 EXAMPLE, GUIDE = ROOT / "examples" / "rated_24_95.toml", ROOT / "examples" / "guides" / "rating.md"

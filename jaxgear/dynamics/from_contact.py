@@ -16,9 +16,8 @@ from ..contact.status import Status, status_of
 from ..microgeometry import AbstractModification
 from ..numerics import Given, check, concrete, program, real, whole
 from ..numerics.programs import is_eager
-from .drive_and_coast import Both, Static, coast_flanks, drive_flanks, static
 from .force import AbstractMeshForce
-from .force_map import FlankSprings, ForceMap, Tangent, tabulate
+from .force_map import Both, FlankSprings, ForceMap, Static, Tangent, coast_flanks, drive_flanks, static, tabulate
 
 Scalar = Float[Array, ""]
 Model = Literal["map", "varying stiffness", "loaded error", "tangent"]

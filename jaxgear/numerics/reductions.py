@@ -1,4 +1,4 @@
-"""One number of many values: the largest, the range, the mean, a harmonic.
+"""One number for many values: reductions (largest, range, mean, harmonic) and measures of weighted values.
 
 The derivative of `jax.numpy.max` counts the entries that equal the maximum. A compiler may evaluate the array a second
 time, with other rounding, for that comparison: then no entry equals the maximum and the derivative is 0/0, which
@@ -10,6 +10,10 @@ gradients; and, where it is made of extremes, the pieces with which a linear pro
 it is to be made small and s = -1 where it is to be made large,
 
     s R(v) = max_i (a v_i) - min_i (b v_i).
+
+A measure (mean, worst, quantile, conditional value at risk) is a spectral one (Acerbi 2002, doi
+10.1016/S0378-4266(02)00281-9): a weighted mean of the sorted values. Its gradient passes through the values, with the
+weights of their ranks.
 """
 
 from abc import ABC, abstractmethod
@@ -18,10 +22,12 @@ from functools import partial
 
 import jax
 import jax.numpy as jnp
+from jax.scipy.special import betainc
 from jaxtyping import Array, Float
 
 from .conversion import Given
-from .fields import whole
+from .fields import Checked, number, whole
+from .programs import quick_jit
 
 _MOST_PLACES = 1 << 16  # leaves 36 bits of the mantissa, ten digits
 
@@ -216,3 +222,78 @@ def _root(squared):
     """Square root with derivative zero at zero; passes NaN on."""
     nothing = squared <= 0
     return jnp.where(nothing, 0.0, jnp.sqrt(jnp.where(nothing, 1.0, squared)))
+
+
+Scalar = Float[Array, ""]
+Samples = Float[Array, " values"]
+Edges = Float[Array, " edges"]
+
+
+class AbstractMeasure(Checked):
+    """Measure that joins many values into one."""
+
+    @abstractmethod
+    def spread(self, share: Edges, count: Scalar) -> Edges:
+        """How much of the result the lowest values up to a `share` of all weights carry, from 0 to 1.
+
+        Args:
+            share: ascending shares, 0 first, 1 last.
+            count: effective number of values.
+        """
+
+    @quick_jit
+    def shares(self, values: Samples, weights: Samples) -> Samples:
+        """Weight of every value in the result, in the order of the values; the weights sum to 1."""
+        order = jnp.argsort(values)
+        cumulative = jnp.cumsum(weights[order])
+        edges = jnp.concatenate([jnp.zeros_like(cumulative[:1]), cumulative / cumulative[-1]])
+        # compiled, the quotient of two equal numbers can be just below 1, and the worst value then has no share
+        rounding = 4 * values.shape[0] * jnp.finfo(edges.dtype).eps
+        edges = jnp.where(edges > 1 - rounding, 1.0, edges)
+        count = jnp.sum(weights) ** 2 / jnp.sum(weights**2)
+        carried = jnp.where(weights[order] > 0, jnp.diff(self.spread(edges, count)), 0.0)
+        return jnp.zeros_like(values).at[order].set(carried)
+
+    @quick_jit
+    def __call__(self, values: Samples, weights: Samples) -> Scalar:
+        """Measure of the values; values that are not finite count if they carry a share."""
+        shares = self.shares(values, weights)
+        return jnp.sum(jnp.where(shares > 0, shares * values, 0.0))
+
+
+class Mean(AbstractMeasure):
+    """Weighted mean."""
+
+    def spread(self, share: Edges, count: Scalar) -> Edges:
+        return share
+
+
+class Worst(AbstractMeasure):
+    """Largest value."""
+
+    def spread(self, share: Edges, count: Scalar) -> Edges:
+        return jnp.where(share >= 1, 1.0, 0.0).astype(share.dtype)
+
+
+class CVaR(AbstractMeasure):
+    """Conditional value at risk: mean of the worst 1 - level of all values (Rockafellar and Uryasev 2000)."""
+
+    level: Scalar = number("", low=0.0, high=1.0, open_high=True, default=0.95)
+
+    def spread(self, share: Edges, count: Scalar) -> Edges:
+        level = self.level.astype(share.dtype)
+        return jnp.maximum(share - level, 0.0) / (1 - level)
+
+
+class Quantile(AbstractMeasure):
+    """Quantile after Harrell and Davis (1982, doi 10.1093/biomet/69.3.635).
+
+    It weighs the sorted values with a beta distribution, so that its gradient follows many values and not the one that
+    happens to stand at the level.
+    """
+
+    level: Scalar = number("", low=0.0, high=1.0, open_low=True, open_high=True, default=0.95)
+
+    def spread(self, share: Edges, count: Scalar) -> Edges:
+        level = self.level.astype(share.dtype)
+        return betainc((count + 1) * level, (count + 1) * (1 - level), share)

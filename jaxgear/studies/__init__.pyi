@@ -4,10 +4,10 @@ from .analysis import AnalysisStudy as AnalysisStudy
 from .analysis import OptimizationStudy as OptimizationStudy
 from .checkpoints import Checkpoints as Checkpoints
 from .checkpoints import NamedArrays as NamedArrays
+from .comparison import ComparisonResult as ComparisonResult
 from .comparison import compared as compared
 from .comparison import rule_based as rule_based
 from .comparison import search_of as search_of
-from .comparison_result import ComparisonResult as ComparisonResult
 from .dynamics import DynamicsStudy as DynamicsStudy
 from .dynamics_result import DynamicsResult as DynamicsResult
 from .evaluation import Evaluation as Evaluation

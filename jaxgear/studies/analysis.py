@@ -27,8 +27,7 @@ from ..optimize import (
 from ..tolerance import ManufacturedGears
 from . import manufactured, side_by_side
 from .checkpoints import Checkpoints
-from .comparison import Modifications, rule_based
-from .comparison_result import ComparisonResult
+from .comparison import ComparisonResult, Modifications, rule_based
 from .evaluation import Evaluation, coarse, evaluation_of, torques_of
 from .optimization_result import COMPROMISE, OptimizationResult
 from .study import AbstractStudy, Stages

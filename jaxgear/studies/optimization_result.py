@@ -22,7 +22,7 @@ from ..optimize.verdict import over_cases
 from ..report import Figure, Table, text
 from ..vocabulary import quantities
 from . import side_by_side
-from .comparison_result import ComparisonResult
+from .comparison import ComparisonResult
 from .evaluation import response_surface
 from .gear_data import mounting
 from .summary import flanks_data
