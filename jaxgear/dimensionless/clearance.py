@@ -45,7 +45,7 @@ class PolynomialClearance(AbstractMeshForce):
 
     @classmethod
     def fit(cls, order: int = 7, range: Given = 3.0) -> "PolynomialClearance":
-        """Least squares of the dead zone over |x| <= range.
+        """Polynomial fitted to the dead zone by least squares over |x| <= range.
 
         Args:
             order: 3, 5 or 7.

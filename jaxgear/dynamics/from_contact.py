@@ -177,7 +177,8 @@ def _made(mesh, torque, both, deviation, model, levels, reach, compliance) -> Fo
 
 @program
 def _touching(found: list[Static], clearances: list[Any], reach: Scalar) -> tuple[Array, Array, Scalar, Scalar, Any]:
-    """DTE at which both flanks touch, deflection under the torque and `reach` of its most, least clearance, status."""
+    """DTE at first contact of both flanks, deflection under the torque, its largest value times `reach`, clearance,
+    status."""
     start = jnp.stack([each.unloaded + clearance for each, clearance in zip(found, clearances)])
     deflection = jnp.stack([each.loaded - each.unloaded for each in found])
     least = jnp.min(start[0] + start[1])

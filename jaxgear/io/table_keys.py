@@ -234,7 +234,7 @@ def summary(of: object) -> str:
 
 
 def _kind(cls, field: dataclasses.Field[Any], most: int | None, open: bool) -> ValueType | None:
-    """ValueType of value that the key of a field takes; None for a field without a key."""
+    """Value type of the key of a field; None for a field without a key."""
     number = fields_of(cls).get(field.name)
     if number is not None:
         return _number(number if most is None else dataclasses.replace(number, high=most), open)

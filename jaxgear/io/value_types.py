@@ -78,7 +78,7 @@ def allowed(number: Number) -> str:
 
 @dataclass(frozen=True, eq=False)
 class ValueType:
-    """ValueType of value that a key takes.
+    """Type of the value of a key.
 
     Attributes:
         words: allowed values in words, for messages and the reference.

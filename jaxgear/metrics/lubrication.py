@@ -322,7 +322,7 @@ def film_thickness(cycle: MeshCycle, lubricant: Lubricant) -> Load:
 def film_between(
     lubricant: Lubricant, radius: Real, rolling: Real, pressure: Real, modulus: Real, temperatures: tuple[Real, Real]
 ) -> Real:
-    """The formula of `film_thickness` on its own [um].
+    """Film thickness by the formula of `film_thickness` from radius, speed, pressure and temperatures [um].
 
     Args:
         lubricant: oil.

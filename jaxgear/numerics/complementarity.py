@@ -141,7 +141,7 @@ def _times(matrix: Inverse | Matrix, rows: Slopes) -> Rows:
 
 
 def left_after(problem: ContactProblem, found: Response, before: Rows) -> Rows:
-    """`opening` after a step that has changed the loads by those found, from that `before`: the gap for a whole one."""
+    """Opening after a linearized step that adds the loads of `found` to those with the opening `before`."""
     own = _times(problem.compliance, found.load)
     return [y + start - pressed for y, start, pressed in zip(own, before, found.pressed)]
 

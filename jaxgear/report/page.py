@@ -61,11 +61,11 @@ class Table:
     narrow: bool = False
 
     def add_row(self, *cells: str) -> None:
-        """Adds a row at the end."""
+        """Add a row at the end."""
         self.rows += (cells,)
 
     def add_section(self) -> None:
-        """Ends a group of rows."""
+        """End a group of rows."""
         self.ends += (len(self.rows) - 1,)
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> Iterator[rich.table.Table]:

@@ -213,7 +213,7 @@ class OptimizationStudy(AbstractStudy[ComparisonResult]):
 
     @property
     def folder(self) -> str:
-        """Folder of the results of the method below that of the design file."""
+        """Folder of the results, one per method."""
         return f"{self.name}/{self.search.method}"
 
     def omits(self) -> str:
