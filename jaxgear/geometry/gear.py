@@ -63,7 +63,7 @@ class Shape(NamedTuple):
 
     @property
     def diameters(self) -> tuple[Any, ...]:
-        """Of tip, tip form, base and root circle, and of the fixed circle [mm]."""
+        """Diameters of tip, tip form, base and root circle, and of the fixed circle [mm]."""
         return self[6:]
 
 
