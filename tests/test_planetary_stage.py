@@ -11,11 +11,15 @@ from pathlib import Path
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import matplotlib
 import numpy as np
 import pytest
+from matplotlib.patches import Wedge
 
 import jaxgear as jg
-from jaxgear.planetary import PlanetaryStage, StageGears, TableMesh, prepare_stage, solve_stage
+from jaxgear.planetary import PlanetaryStage, StageGears, TableMesh, figures, prepare_stage, solve_stage
+
+matplotlib.use("Agg")
 
 REFERENCE = np.load(Path(__file__).with_name("planetary_reference.npz"))
 WIDTH = 20.0
@@ -93,12 +97,17 @@ def test_meshes_in_phase():
     assert cycle.orbit < 1e-9
 
 
-def test_three_planets_and_a_floating_sun_share_equally():
-    """Static determinacy: whatever the errors, at every phase, up to the hundredth of a newton of its support."""
+@pytest.mark.parametrize(("size", "torque"), [(1.0, 400.0), (-8.0, 400.0), (15.0, 8.0), (-15.0, 3.0)])
+def test_three_planets_and_a_floating_sun_share_equally(size, torque):
+    """Static determinacy: whatever the errors, at every phase; also where the sun has to move by many times what the
+    teeth give before all planets touch."""
     errors = {"tangential_pin_error": [-20.0, 5.0, 9.0], "sun_gap": [0.0, 4.0, 1.0], "ring_gap": [3.0, 0.0, 7.0]}
-    cycle = solved(stage(sun_support=0.0, **errors))
+    cycle = solved(
+        stage(sun_support=0.0, **{name: size * np.asarray(each) for name, each in errors.items()}), "none", torque
+    )
+    assert cycle.converged.all() and not cycle.loose.any()
     np.testing.assert_allclose(cycle.load_share, 1.0, atol=1e-9)
-    assert cycle.orbit > 1
+    assert cycle.orbit > 1 or torque < 10
 
 
 def test_errors_that_change_no_force():
@@ -194,3 +203,25 @@ def test_another_stage_of_the_same_gears():
 def test_calls_that_mean_nothing_are_refused(call, text):
     with pytest.raises((ValueError, TypeError), match=text):
         call(prepared(stage()))
+
+
+@pytest.mark.usefixtures("clean_figures")
+def test_figures_show_what_the_cycle_has():
+    own, _ = CASES["N3_error_held"]
+    cycle = solved(own)
+    drawing = figures.stage_drawing(own)
+    filled = [patch for patch in drawing.patches if isinstance(patch, Wedge)]
+    shares = [(patch.theta2 - patch.theta1) / 360 for patch in filled]
+    np.testing.assert_allclose(shares, np.repeat([0, 1 / 3, 2 / 3], 2), atol=1e-9)
+    shares = figures.load_shares(cycle)
+    for line, share, mean in zip(shares.lines, cycle.load_share, cycle.mean_load_share):
+        np.testing.assert_array_equal(line.get_ydata()[:60], share)
+        assert f"({mean:.3f})" in line.get_label()
+    orders = figures.orders({"held": cycle})
+    np.testing.assert_allclose([bar.get_height() for bar in orders.patches], amplitudes(cycle))
+    assert [label.get_text()[-1] for label in orders.get_xticklabels()] == list("TTRTTR")
+    (path, _), (curve,) = figures.orbit({"held": cycle}).lines, figures.transmission_error({"held": cycle}).lines
+    assert np.isclose(np.hypot(*path.get_data()).max(), cycle.orbit)
+    assert f"{np.ptp(curve.get_ydata()):.2f}" in curve.get_label()
+    for ax in (drawing, shares, orders, path.axes, curve.axes):
+        assert "[" in ax.get_ylabel()

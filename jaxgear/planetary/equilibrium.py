@@ -19,8 +19,9 @@ Meshes = tuple[AbstractLoadedMesh, AbstractLoadedMesh]
 
 # What may be left of the forces, relative to the sum of the mesh forces: some hundred rounding errors.
 _LEFT = {"float32": 2e-5, "float64": 1e-10}
-_MOST = 40  # steps; six are usual, ten where planets lose contact
-_LEAST_SHARE = 1 / 64
+_MOST = 60  # steps; six are usual, ten where planets lose contact
+_LEAST_SHARE = 1e-6  # of a step, which may be long where a motion has little stiffness
+_MOST_RISE = 0.5  # slope of the energy behind a step over its fall before it
 # Longest step [um], beside the motions so far: springs of lost contacts have no stiffness, and say nothing of how far.
 _LONGEST, _SHORTEST = 15.0, 1e-30
 # Share of the regularization in the stiffness of a central motion above which neither mesh nor support holds it
@@ -117,8 +118,8 @@ def _evaluated(linkage: Linkage, meshes: Meshes, motion: Motion) -> _State:
 def _search(linkage: Linkage, meshes: Meshes, guess: Springs) -> tuple[_State, Central]:
     """The equilibrium by Newton's method, and the diagonal of the inverse stiffness of the central motions there.
 
-    The first step is that of springs of constant stiffness, none of which can lose contact. A later one that leaves
-    more forces over than before is halved.
+    The first step is that of springs of constant stiffness, none of which can lose contact. A later one beyond which
+    the energy rises is cut to a quarter.
     """
     tolerance = _LEFT[str(linkage.force.dtype)]
 
@@ -133,9 +134,11 @@ def _search(linkage: Linkage, meshes: Meshes, guess: Springs) -> tuple[_State, C
         allowed = share * jnp.minimum(1.0, longest / jnp.maximum(_largest(step), _SHORTEST))
         ahead = jax.tree.map(lambda at, back: at - _alike(allowed, at) * back, state.motion, step)
         there = _evaluated(linkage, meshes, ahead)
-        better = there.residual <= state.residual
+        # the energy is convex: a step behind which it falls or rises little was not too long
+        fall, rise = _along(step, state.left), -_along(step, there.left)
+        better = (there.residual <= state.residual) | (rise <= _MOST_RISE * fall)
         state = jax.tree.map(lambda new, old: jnp.where(_alike(better, new), new, old), there, state)
-        return state, flexibility, jnp.where(better, jnp.minimum(2 * share, 1.0), 0.5 * share), count + 1
+        return state, flexibility, jnp.where(better, jnp.minimum(2 * share, 1.0), 0.25 * share), count + 1
 
     begin = _at_rest(linkage, guess)
     flexibility = jnp.zeros_like(begin.motion.central)
@@ -155,6 +158,11 @@ def _at_rest(linkage: Linkage, guess: Springs) -> _State:
 def _alike(curve: Array, of: Array) -> Array:
     """Values of all positions in the shape of an array."""
     return jnp.broadcast_to(curve, of.shape)
+
+
+def _along(step: Motion, forces: Motion) -> Curve:
+    """Work of forces along a step, at every position."""
+    return jnp.sum(step.central * forces.central, axis=0) + jnp.sum(step.local * forces.local, axis=(0, 1))
 
 
 def _largest(motion: Motion) -> Curve:
