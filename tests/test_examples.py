@@ -25,6 +25,7 @@ EXAMPLES = (
     "which_relief_lasts",
     "which_relief_for_one_speed",
     "how_quiet_is_helical",
+    "how_quiet_within_safety",
 )
 
 
@@ -43,7 +44,7 @@ def answers(name):
     return pytest.fixture(scope="module")(lambda: example(name).numbers(results(name)))
 
 
-relief, coupling, curve, robust, manufactured, driven, simulated, quiet, made, lasting, calm, helical = map(
+relief, coupling, curve, robust, manufactured, driven, simulated, quiet, made, lasting, calm, helical, safe = map(
     answers, EXAMPLES
 )
 
@@ -282,3 +283,15 @@ def test_ripple_falls_with_the_overlap_from_that_of_the_spur_pair(helical):
     assert float(found["overlap"][0]) == 0.0
     assert unmodified[0] == pytest.approx(helical["spur_unmodified_ppte_um"], rel=0.02)
     assert (np.diff(unmodified) < 0).all()
+
+
+def test_quiet_gears_keep_their_safeties(safe):
+    """Relief takes the ripple and no safety of the standard; other gears pay for the rest with that of their flanks."""
+    required = example("how_quiet_within_safety").REQUIRED
+    start, flank, gears = ("start", "quietest_flank", "best_gears")
+    assert safe[f"{flank}_ppte_um"] < 0.3 * safe[f"{start}_ppte_um"]
+    assert safe[f"{gears}_ppte_um"] < safe[f"{flank}_ppte_um"]
+    for symbol, least in required.items():
+        assert safe[f"{flank}_{symbol}"] > 0.999 * safe[f"{start}_{symbol}"]
+        assert safe[f"{gears}_{symbol}"] > 0.999 * least
+    assert safe["slopes_error"] < 1e-6
