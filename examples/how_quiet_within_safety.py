@@ -39,7 +39,8 @@ SAFETIES = {
     "S_B": ("rated_scuffing_safety",),
     "S_lambda": ("rated_micropitting_safety",),
 }
-LEAST_LAND = 0.6  # mm of tip land, 0.2 modules
+# margins of the gears: tip land [mm], 0.2 modules, and roll length of the flank that the mate does not reach [mm]
+KEPT = {"pinion_tip_land": 0.6, "wheel_tip_land": 0.6, "pinion_form_clearance": 0.05, "wheel_form_clearance": 0.05}
 SOFTENED = 0.02  # of the extremes of the transmission error in a search [um]
 STEP = 1e-4  # of the central differences, in parts of the bounds
 
@@ -65,7 +66,7 @@ def gear_pair(x):
 
 
 def outcome(x, sizes):
-    """PPTE and its smooth form [um], the safeties, the smaller tip land [mm], and whether all of it holds."""
+    """PPTE and its smooth form [um], the safeties, the margins over those to be kept, and whether all of it holds."""
     pair, rating = gear_pair(x), settings()
     margins, path = jg.margins(pair), jg.path_of_contact(pair)
     relief = jg.TipRelief(x[0], x[1] * (path.end - path.outer_single))
@@ -77,13 +78,13 @@ def outcome(x, sizes):
         "ppte": jg.peak_to_peak(curve),
         "smooth": smooth_peak_to_peak(curve, SOFTENED),
         "safety": jnp.stack(safety),
-        "land": jnp.minimum(margins.pinion_tip_land, margins.wheel_tip_land),
+        "kept": jnp.stack([getattr(margins, name) / least for name, least in KEPT.items()]),
     }
     return numbers, margins.valid & cycle.converged.all()
 
 
 def search(both, start, free):
-    """The quietest point from a start on that keeps every safety and the tip land; `free` numbers of it move."""
+    """The quietest point from a start on that keeps every safety and margin; `free` numbers of it move."""
     known = {}
 
     def at(moved):
@@ -96,10 +97,10 @@ def search(both, start, free):
         return numbers, jax.tree.map(lambda slope: slope[..., free], slopes)
 
     def kept(numbers):
-        return np.append(numbers["safety"] / LEAST - 1, numbers["land"] / LEAST_LAND - 1)
+        return np.append(numbers["safety"] / LEAST, numbers["kept"]) - 1
 
     def slopes_kept(slopes):
-        return np.vstack([slopes["safety"] / LEAST[:, None], slopes["land"] / LEAST_LAND])
+        return np.vstack([slopes["safety"] / LEAST[:, None], slopes["kept"]])
 
     limits = {"type": "ineq", "fun": lambda x: kept(at(x)[0]), "jac": lambda x: slopes_kept(at(x)[1])}
     found = minimize(
@@ -128,7 +129,7 @@ def study(fast=False):
     of = partial(outcome, sizes=sizes)
     sampled, holds = quick_jit(lambda every: jax.lax.map(of, every, batch_size=8))(jnp.asarray(points))
     sampled = jax.tree.map(np.asarray, sampled)
-    holds = np.asarray(holds) & (sampled["land"] >= LEAST_LAND)
+    holds = np.asarray(holds) & (sampled["kept"] >= 1).all(axis=1)
     reserve = np.where(holds, np.min(sampled["safety"] / LEAST, axis=1), -np.inf)
     best = int(np.argmin(np.where(reserve >= 1, sampled["ppte"], np.inf)))
     both = quick_jit(jax.jacfwd(lambda x: ((found := of(x))[0], found), has_aux=True))

@@ -11,6 +11,8 @@ from ..metrics import SNLine
 from ..plot.figure import GREY, Panels, captioned, line_style, report_axes
 from .chain import PairRating
 
+Load = tuple[float, float, float]
+
 _PANEL, _HEIGHT = 92.0, 72.0  # [mm]
 _SHOWN = 0.01  # share of the damage sum from which on a load has its damage as a number
 _ROOM = 10.0  # of cycles on both sides of the lines
@@ -30,7 +32,7 @@ def woehler(found: PairRating, axes: Panels | None = None) -> Panels:
         found: rating with a service life.
         axes: four Axes; None for a new figure.
     """
-    spectrum = found.spectrum
+    spectrum, shown = found.spectrum, []
     modes = ("flank", "H", found.pitting, found.flank_lines), ("tooth root", "F", found.bending, found.root_lines)
     with report_axes(axes, columns=2, rows=2, width=2 * _PANEL, height=2 * _HEIGHT) as panels:
         for row, (words, index, verdict, lines) in enumerate(modes):
@@ -41,13 +43,15 @@ def woehler(found: PairRating, axes: Panels | None = None) -> Panels:
             for gear, name in enumerate(("pinion", "wheel")):
                 panel = panels[2 * row + gear]
                 _line(panel, lines[gear])
-                _loads(panel, lines[gear], *(np.asarray(of[gear]) for of in loads))
+                shown.append((panel, _loads(panel, lines[gear], *(np.asarray(of[gear]) for of in loads))))
                 total, safety = float(verdict.damage[gear]), float(verdict.safety[gear])
                 title = f"{name} {words}: $U_{index}$ = {total:.3g}, $S_{index}$ = {safety:.2f}"
                 panel.set_title(title, fontsize="medium", loc="left")
             panels[2 * row].set_ylabel(rf"stress $\sigma_{index}$ [MPa]")
         for panel in panels[2:]:
             panel.set_xlabel("load cycles [-]")
+        for panel, numbered in shown:  # once all panels have their ranges, which those of a row share
+            _numbers(panel, numbered)
     return panels
 
 
@@ -59,8 +63,8 @@ def _line(panel: Axes, line: SNLine) -> None:
     panel.yaxis.set_minor_formatter(NullFormatter())
 
 
-def _loads(panel: Axes, line: SNLine, stress: np.ndarray, damage: np.ndarray, cycles: np.ndarray) -> None:
-    """Marks of the loads, with their ways to the line."""
+def _loads(panel: Axes, line: SNLine, stress: np.ndarray, damage: np.ndarray, cycles: np.ndarray) -> list[Load]:
+    """Marks of the loads, with their ways to the line; cycles, stress and damage of those to be numbered."""
     run = (cycles > 0) & (stress > 0)
     does = run & (damage > 0)
     ends = np.exp(np.asarray(line.log_cycles(stress)))
@@ -74,10 +78,10 @@ def _loads(panel: Axes, line: SNLine, stress: np.ndarray, damage: np.ndarray, cy
     panel.yaxis.set_major_formatter(ScalarFormatter())
     shown = np.flatnonzero(does & (damage >= _SHOWN * np.sum(damage)))
     shown = shown[np.argsort(-damage[shown])][:_MOST]
-    _numbers(panel, [(cycles[at], stress[at], damage[at]) for at in sorted(shown, key=lambda at: -stress[at])])
+    return [(cycles[at], stress[at], damage[at]) for at in sorted(shown, key=lambda at: -stress[at])]
 
 
-def _numbers(panel: Axes, loads: Sequence[tuple[float, float, float]]) -> None:
+def _numbers(panel: Axes, loads: Sequence[Load]) -> None:
     """Damages in a column at the left, each beside its load as far as the one above leaves room."""
     above = 1.0
     for cycles, stress, damage in loads:
