@@ -1,6 +1,7 @@
 """Planetary stages: loaded contact of all meshes of sun, planets and ring, in equilibrium with their supports.
 
-gears = StageGears(26, 19, 64, module=3.0)
+sun_planet, planet_ring = jaxgear.GearPair(sun, planet), jaxgear.GearPair(planet, ring)  # `ring` is a `RingGear`
+gears = StageGears.of_pairs(sun_planet, planet_ring)
 stage = PlanetaryStage(gears, 3, radial_pin_stiffness=400.0, tangential_pin_stiffness=400.0, sun_support=0.0)
 prepared = prepare_stage(stage, sun=jaxgear.prepare(sun_planet), ring=jaxgear.prepare(planet_ring))
 cycle = solve_stage(prepared, 400.0, planet_to_sun=jaxgear.TipRelief(10.0, 4.0))
