@@ -11,7 +11,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from catalogue import LINE, gear_pair, prepare, solve
+from catalogue import FOUR_PAIRS, LINE, gear_pair, prepare, solve
 
 import jaxgear as jg
 from jaxgear.geometry import RingGear
@@ -111,8 +111,9 @@ def test_reference_stage_with_the_meshes_of_the_library(name, late, relief):
     assert abs((own.gears.phase_between_meshes + 0.5) % 1 - 0.5) < 1e-9
     with pytest.raises(ValueError, match="planet has teeth = 19 in the mesh with the sun and 26 in that with the ring"):
         StageGears.of_pairs(pairs[0], jg.GearPair(sun, ring))
-    sizes = jg.Resolution(positions=60, pairs=3)
-    meshes = [jg.prepare(pair, compliance=jg.default_compliance(plane="stress"), resolution=sizes) for pair in pairs]
+    meshes = [
+        jg.prepare(pair, compliance=jg.default_compliance(plane="stress"), resolution=FOUR_PAIRS) for pair in pairs
+    ]
     stage, flank = prepare_stage(own, sun=meshes[0], ring=meshes[1]), jg.TipRelief(relief, 4.0)
     cycle = solve_stage(stage, 650.0, sun=flank, planet_to_sun=flank, planet_to_ring=flank, ring=flank)
     error, _, _, *forces = np.load(Path(__file__).with_name("planetary_reference.npz"))[name].astype(float).T
