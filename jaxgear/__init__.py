@@ -1,8 +1,8 @@
-"""jaxgear: what a spur-gear flank modification does under load, and which one is best.
+"""jaxgear: what a flank modification of a gear pair does under load, and which one is best.
 
 The pipeline in reading order, every step differentiable and vmappable:
 
-    Gear, GearPair              geometry of an external involute pair, spur or helical
+    Gear, RingGear, GearPair    geometry of an involute pair, external (spur or helical) or internal (spur)
     TipRelief + LeadCrowning    microgeometry, composed with `+`
     default_compliance          teeth, gear bodies with coupled neighbours, Hertzian contact
     finite_element_compliance   teeth and bodies by finite elements, for gears that stay as they are

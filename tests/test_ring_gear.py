@@ -15,6 +15,7 @@ from jaxgear.compliance import default_compliance, ring
 from jaxgear.contact.kinematics import contacts
 from jaxgear.geometry import allowance_of_balls, margins, measures, outline, over_balls, path_of_contact, span
 from jaxgear.geometry.interference import Tips, radial_assembly_clearance, trochoid_clearance
+from jaxgear.rating.mesh_geometry import mesh_geometry
 
 # planet, ring gear: what is not that of the defaults
 R1 = {"teeth": 19, "bore_diameter": 24.0}, {"teeth": 64, "cutter_teeth": 25, "root_radius": 0.25, "rim_diameter": 236.4}
@@ -238,3 +239,15 @@ def test_measured_between_balls():
     with pytest.raises(ValueError, match="between balls"):
         span(RING, 5)
     assert np.isnan(measures(RING).span) and float(measures(RING, ball=5.25).over_balls) == float(between)
+
+
+@pytest.mark.parametrize(
+    "refused",
+    [
+        jg.finite_element_compliance,
+        mesh_geometry,
+    ],
+)
+def test_what_does_not_know_ring_gears_says_so(refused):
+    with pytest.raises(ValueError, match="external gears alone"):
+        refused(jg.GearPair(PLANET, RING))

@@ -1,4 +1,4 @@
-"""Gears, their pairing, the generated tooth outline and the path of contact (external involute gears).
+"""Gears, their pairing, the generated tooth outline and the path of contact, of external and internal involute pairs.
 
 `drawn_gear` makes a gear from the tooth thickness and the diameters on its drawing.
 
@@ -10,6 +10,8 @@ Coordinates and signs used everywhere:
 - `path` s is the position along the line of action from the pitch point [mm], positive towards the pinion tip (recess):
   rho_pinion = rho_C,pinion + s, rho_wheel = rho_C,wheel - s;
 - `phase` psi counts base pitches, psi = 0 with the reference pair at the pitch point: s = psi p_b;
+- radii, roll lengths and the number of teeth of a ring gear are negative within the formulas (ISO 21771), which are
+  those of external gears; what a user gives and reads as a diameter is positive;
 - helical gears run in their transverse section; the contact at the face coordinate y lies y tan(beta_b) ahead on the
   path: s = psi p_bt + y tan(beta_b).
 """
@@ -20,6 +22,7 @@ from .drawing import ToothProfile as ToothProfile
 from .drawing import drawn_gear as drawn_gear
 from .drawing import with_profile as with_profile
 from .gear import Gear as Gear
+from .gear import check_external as check_external
 from .gear import check_spur as check_spur
 from .involute import diameter as diameter
 from .involute import roll_angle as roll_angle

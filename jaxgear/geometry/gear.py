@@ -479,12 +479,23 @@ def with_diameters(gear: Gear) -> Gear:
     return changed(gear, **{name: real(value) for name, value in diameters.items()}) if diameters else gear
 
 
-def check_spur(*gears: Gear) -> None:
-    """Raise for helical gears, in functions for spur gears only.
+def check_external(*gears: Gear) -> None:
+    """Raise for ring gears, in functions for external gears only.
 
     Raises:
-        ValueError: for a gear whose helix angle is traced or not zero.
+        ValueError: for a ring gear.
     """
+    if any(gear.is_internal for gear in gears):
+        raise ValueError("a RingGear is an internal gear: external gears alone are covered")
+
+
+def check_spur(*gears: Gear) -> None:
+    """Raise for helical and ring gears, in functions for external spur gears only.
+
+    Raises:
+        ValueError: for a gear whose helix angle is traced or not zero, and for a ring gear.
+    """
+    check_external(*gears)
     for gear in gears:
         if not gear.is_spur:
             assert gear.helix_angle is not None

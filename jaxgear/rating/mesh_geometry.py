@@ -7,7 +7,7 @@ References:
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ..geometry import GearPair, PathOfContact, path_of_contact
+from ..geometry import GearPair, PathOfContact, check_external, path_of_contact
 from ..numerics import Checked, Given, real, result
 
 Scalar = Float[Array, ""]
@@ -140,7 +140,11 @@ def mesh_geometry(pair: GearPair, path: PathOfContact | None = None) -> MeshGeom
     Args:
         pair: gear pair.
         path: its path of contact, where it is known.
+
+    Raises:
+        ValueError: for a ring gear.
     """
+    check_external(*pair.gears)
     path = path_of_contact(pair) if path is None else path
     pinion, gears = pair.pinion, pair.gears
     helix = jnp.zeros_like(pinion.module) if pinion.helix_angle is None else jnp.abs(jnp.deg2rad(pinion.helix_angle))

@@ -295,6 +295,8 @@ def write_gear(
     model: Model, gear: Gear, name: str, quality: int | None, material_name: str | None = None
 ) -> tuple[Component, list[Component]]:
     """Write a gear; returns the components of the gear and of its left and right flank."""
+    if gear.is_internal:
+        raise ValueError(f"{name} is a RingGear: external gears alone can be written")
     tip = 2 * gear.tip_radius if gear.tip_diameter is None else gear.tip_diameter
     hand = 0.0 if gear.helix_angle is None else gear.helix_angle
     part = model.add(
