@@ -39,8 +39,8 @@ from .resolution import Resolution
 Real = Float[Array, "..."]
 
 # Beyond this many base pitches outside the path the gap is hundreds of um; it goes on along its tangent there. Tips of
-# a planet stay close to the flank of a ring gear with few teeth more.
-REACH, _INTERNAL_REACH = 0.4, 1.5
+# a planet stay close to the flank of a ring gear with few teeth more; with many more, so far out, they swing back.
+REACH, _CLOSE_REACH, _CLOSE_TEETH = 0.4, 1.5, 15.0
 
 
 def corner_gap(
@@ -286,6 +286,8 @@ class _End(NamedTuple):
         at_form: whether the path ends at the form circle of the mate, whose edge touches then.
         lengths: of the tip corner and its mate, as `corner_gap` takes them.
         tip_gear_end: roll length at this end of the gear whose tip is there [mm].
+        farthest: largest roll length of the mate that a tip corner touches [mm]. In an internal pair it ends at the
+            middle of the mate's flank, and where flanks would not fit into each other: corners far out swing back.
         reach: beyond this distance the gap goes on along its tangent, so that far pairs stay finite and apart [mm].
     """
 
@@ -293,6 +295,7 @@ class _End(NamedTuple):
     at_form: Bool[Array, ""]
     lengths: tuple[Scalar, Scalar, Scalar, Scalar]
     tip_gear_end: Scalar
+    farthest: Scalar
     reach: Scalar
 
     def at_contacts(self, value: Array) -> Array:
@@ -310,7 +313,7 @@ class _End(NamedTuple):
 
     def on_flank(self, touched: Real) -> Real:
         """Roll lengths of the involute that is touched, of a form circle's edge up to the tip of the mate."""
-        return jnp.where(self.at_form, jnp.minimum(touched, self.at_contacts(self.lengths[0])), touched)
+        return jnp.minimum(touched, self.at_contacts(jnp.where(self.at_form, self.lengths[0], self.farthest)))
 
     @property
     def near(self) -> Real:
@@ -325,16 +328,24 @@ def _ends(pair: GearPair, contact: PathOfContact, path: Real) -> tuple[_End, _En
         (contact.pinion_roll_length(place), contact.wheel_roll_length(place)) for place in (contact.start, contact.end)
     )
     # the edge of an undercut passes the tip of the mate about as far outside the path as this is shortened
-    reach = _INTERNAL_REACH if pair.wheel.is_internal else REACH
+    reach: Scalar | float = REACH
+    if pair.wheel.is_internal:
+        reach = jnp.where(pair.wheel.teeth - pair.pinion.teeth < _CLOSE_TEETH, _CLOSE_REACH, REACH)
     start, end = (
         (shortened > 0, reach * contact.base_pitch + shortened)
         for shortened in (contact.start_shortened, contact.end_shortened)
     )
     approach = pair.wheel.tip_roll_length, wheel_base, first, pinion_base
     recess = pair.pinion.tip_roll_length, pinion_base, before_last, wheel_base
+    farthest = [jnp.full_like(first, jnp.inf)] * 2
+    if pair.wheel.is_internal:
+        middles = 0.5 * (first + last), 0.5 * (second + before_last)
+        farthest = [
+            jnp.minimum(0.5 * (mate - tip), middle) for (tip, _, mate, _), middle in zip((approach, recess), middles)
+        ]
     return (
-        _End(contact.start - path, start[0], approach, second, start[1]),
-        _End(path - contact.end, end[0], recess, last, end[1]),
+        _End(contact.start - path, start[0], approach, second, farthest[0], start[1]),
+        _End(path - contact.end, end[0], recess, last, farthest[1], end[1]),
     )
 
 

@@ -425,7 +425,7 @@ def _outer_steps(mesh: Mesh) -> Float[Array, "2 #slices positions"]:
     second = min(1, mesh.resolution.positions - 1)  # of a single position there is no step, and nothing falls
     edges = [(pinion[-1, ..., 0], pinion[-1, ..., second]), (wheel[0, ..., -1], wheel[0, ..., -1 - second])]
     first, next_one = (jnp.stack(each)[..., None] for each in zip(*edges))
-    one = jnp.maximum(jnp.abs(first - next_one), 1e-6 * first)
+    one = jnp.maximum(jnp.abs(first - next_one), 1e-6 * jnp.abs(first))
     return jax.lax.stop_gradient(jnp.abs(mesh.outer_roll_length - first) / one)
 
 
