@@ -58,7 +58,7 @@ def test_a_relief_and_an_offset_are_found_where_the_model_itself_made_the_data()
     result = identify(
         meshed, data, relief, {"pinion": PRIOR["pinion"]}, torque_scale=None, offset=10.0, model_error=0.0
     )
-    assert result.converged and result.names == ("pinion", "offset") and not result.not_told()
+    assert result.converged and result.names == ("pinion", "offset") and not result.undetermined()
     np.testing.assert_allclose(result.estimate, [9.0, OFFSET], atol=1e-6)
     assert np.all(result.deviation < 1e-4) and np.all(result.deviation < result.prior[1])
 
@@ -70,7 +70,7 @@ def test_three_torques_tell_flanks_scale_and_offset():
     assert result.converged and result.names == ("pinion", "wheel", "torque_scale", "offset")
     assert np.all(np.abs(result.estimate - true) < 2.5 * result.deviation)
     assert np.all(result.deviation < result.prior[1]) and 0.5 < result.chi_square < 1.5
-    assert not result.not_told()
+    assert not result.undetermined()
     assert np.mean(result.residual_orders < result.noise_orders[:, None]) > 0.8  # 95 % but for what the fit takes
     np.testing.assert_allclose(np.diag(result.correlation), 1.0)
 
@@ -78,7 +78,7 @@ def test_three_torques_tell_flanks_scale_and_offset():
 @pytest.mark.slow
 def test_one_torque_cannot_tell_its_scale_and_names_the_torque_that_would():
     one = found(TORQUES[1:2], candidates=(60.0, 240.0))
-    assert any("torque_scale" in line and "cannot be told" in line for line in one.not_told())
+    assert any("torque_scale" in line and "cannot be told" in line for line in one.undetermined())
     scale = one.names.index("torque_scale")
     assert one.deviation[scale] > 0.7 * one.prior[1, scale]  # the prior is nearly all that is known
     # the same torque once more says little, another one most
@@ -191,12 +191,12 @@ def test_all_pitch_deviations_are_told_once_all_teeth_have_met():
         return result, every[1]
 
     whole, deviation = told(272 * 16)
-    assert np.max(deviation) < 0.1 and not any("pitch" in line for line in whole.not_told())
+    assert np.max(deviation) < 0.1 and not any("pitch" in line for line in whole.undetermined())
     np.testing.assert_allclose(whole.estimate[:2], list(TRUE.values()), atol=0.1)
     turn, deviation = told(17 * 16)
     assert np.median(deviation) > 1.0
     # 31 are independent; 17 pairs that meet, with that of the next revolution, tell 17 at most
-    (line,) = (line for line in turn.not_told() if "pitch" in line)
+    (line,) = (line for line in turn.undetermined() if "pitch" in line)
     assert 13 <= int(line.split()[0]) <= 16 and "their sum alone is seen" in line
 
 

@@ -15,6 +15,7 @@ from jaxgear.compliance import default_compliance, ring
 from jaxgear.contact.kinematics import contacts
 from jaxgear.geometry import allowance_of_balls, margins, measures, outline, over_balls, path_of_contact, span
 from jaxgear.geometry.interference import Tips, radial_assembly_clearance, trochoid_clearance
+from jaxgear.io import DesignFileError, load_design
 from jaxgear.rating.mesh_geometry import mesh_geometry
 
 # planet, ring gear: what is not that of the defaults
@@ -251,3 +252,54 @@ def test_measured_between_balls():
 def test_what_does_not_know_ring_gears_says_so(refused):
     with pytest.raises(ValueError, match="external gears alone"):
         refused(jg.GearPair(PLANET, RING))
+
+
+FILE = """
+[pinion]
+teeth = 19
+module = 3.0
+face_width = 20.0
+
+[ring]
+teeth = 64
+module = 3.0
+face_width = 20.0
+cutter_teeth = 25
+rim_diameter = 236.4
+
+[[ring.modification]]
+type = "tip_relief"
+amount = 10.0
+length = 4.0
+
+[load]
+torque = 200.0
+"""
+
+
+def written(folder, text):
+    path = folder / "pair.toml"
+    path.write_text(text)
+    return path
+
+
+def test_design_file_with_a_ring_gear(tmp_path):
+    design = load_design(written(tmp_path, FILE))
+    wheel = design.pair().wheel
+    assert isinstance(wheel, jg.RingGear) and float(wheel.rim_diameter) == 236.4 and float(wheel.cutter_teeth) == 25
+    _, relief = design.design({})
+    assert float(relief.amount) == 10.0
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (("[ring]", "[wheel]\nteeth = 64\n\n[ring]"), "wheel.module: missing"),
+        (("[ring]", "[wheel]\nteeth = 64\nmodule = 3.0\nface_width = 20.0\n\n[ring]"), "ring: has no effect beside"),
+        (("rim_diameter = 236.4", "bore_diameter = 100.0"), "ring.bore_diameter: unknown key"),
+        (("rim_diameter = 236.4", "rim_diameter = 150.0"), "ring.rim_diameter: 150 mm must be greater than 199.5 mm"),
+    ],
+)
+def test_wrong_ring_gears_in_files(tmp_path, change, said):
+    with pytest.raises(DesignFileError, match=said):
+        load_design(written(tmp_path, FILE.replace(*change)))

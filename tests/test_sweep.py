@@ -200,7 +200,11 @@ def test_an_interruption_costs_a_small_share_of_a_sweep(mesh, table, tmp_path, m
     sizes = {}
     for batch in (4, 7):
         monkeypatch.setattr("jaxgear.sweeps.run.side_by_side", lambda *_, batch=batch: batch)
-        assert_same(table, run(mesh, part_rows=None, output=tmp_path / "out"))
+        found = run(mesh, part_rows=None, output=tmp_path / "out")
+        assert found.names == table.names and (found.column("status") == table.column("status")).all()
+        for name in table.names:  # as many side by side as on another device: equal to rounding
+            if name != "status":
+                np.testing.assert_allclose(found.column(name), table.column(name), rtol=1e-13, err_msg=name)
         sizes[batch] = [path.name for path in parts_of(tmp_path / "out")]
         parts_of(tmp_path / "out")[1].unlink()
     assert sizes[4] == sizes[7] and len(sizes[4]) == -(-40 // (8 * len(jax.local_devices())))

@@ -70,7 +70,7 @@ def trochoid_clearance(tips: Tips, distance: Scalar, tangent: Scalar) -> Scalar:
     """Least angle of the ring gear between its tip corners and those of the gear inside [rad]; negative if they hit.
 
     Both corners are on one radius where the tip circles cross: theta_1 z_1 / z_2 + inv(alpha_w) - inv(alpha_a2) -
-    theta_2. It is the secondary, or trochoid, interference of internal gears (SDP/SI D785, section 10.3).
+    theta_2. It is the secondary, or trochoid, interference of internal gears (SDP/SI D785).
 
     Args:
         tips: radii of both.
@@ -89,7 +89,7 @@ def trochoid_clearance(tips: Tips, distance: Scalar, tangent: Scalar) -> Scalar:
 def radial_assembly_clearance(tips: Tips, tangent: Scalar) -> Scalar:
     """Least angle of the gear inside between the tips while it moves into the ring gear along a radius [rad].
 
-    Negative if it must be assembled along the axis (trimming interference, SDP/SI D785, section 10.3).
+    Negative if it must be assembled along the axis (trimming interference, SDP/SI D785).
 
     Args:
         tips: radii of both.

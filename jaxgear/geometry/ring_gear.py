@@ -31,8 +31,8 @@ class RingGear(Gear):
         d_a = m (z - 2 h_aP - 2 x),  d_f = m (z + 2 h_fP - 2 x)
 
     Attributes:
-        teeth, module, pressure_angle, profile_shift, face_width, tip_edge_radius, tooth_thickness_allowance,
-            tooth_thickness_tolerance, material: as of `Gear`.
+        teeth, module, pressure_angle, profile_shift, face_width, tip_edge_radius, material: as of `Gear`.
+        tooth_thickness_allowance, tooth_thickness_tolerance: as of `Gear`.
         addendum, dedendum: coefficients h_aP and h_fP [modules]. Rings need short teeth: with h_aP = 1 the tip of many
             meets the pinion below its form circle. The addendum of the cutter follows from the root circle.
         root_radius: tip radius rho_a0 of the cutter [modules]; None for 0.38, or the full radius of the cutter if its
@@ -50,7 +50,7 @@ class RingGear(Gear):
             diameter not greater than the root diameter. Helical ring gears are not covered.
 
     References:
-        ISO 21771:2007; A. Kapelevich, SDP/SI D785 (internal gears); generation by a cutter as of `geometry.cutter`.
+        ISO 21771:2007; SDP/SI D785, Elements of Metric Gear Technology (internal gears).
     """
 
     is_internal: ClassVar[bool] = True

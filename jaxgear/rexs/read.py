@@ -440,7 +440,7 @@ def rexs_stages(path: str | Path) -> tuple[RexsStage, ...]:
 
 def _stages_of(model: Model) -> Iterator[RexsStage]:
     for part in [*model.components.values()]:
-        if part.type.endswith("_rexs_stage"):
+        if part.type.endswith("_stage"):
             yield _rexs_stage(model, part)
 
 
