@@ -213,6 +213,8 @@ PLANET, RING = jg.Gear(19, 3.0, face_width=20.0), jg.RingGear(64, 3.0, face_widt
         (lambda: internal({"teeth": 36}, {"teeth": 42}), "clash"),
         (lambda: jg.RingGear(64, 3.0, face_width=20.0, rim_diameter=190.0), "rim_diameter = 190 mm must be greater"),
         (lambda: jg.RingGear(64, 3.0, face_width=20.0, tip_diameter=178.0), "than 180.421 mm, the base diameter"),
+        (lambda: jg.RingGear(64, 3.0, face_width=20.0, cutter_teeth=10), "RingGear: cutter_teeth = 10 generates"),
+        (lambda: jg.RingGear(64, 3.0, face_width=20.0, root_radius=0.9), "RingGear: root_radius = 0.9"),
         (lambda: jg.GearPair(RING, PLANET), "pinion is a RingGear"),
         (lambda: jg.GearPair(PLANET, RING, 68.0), "must be at most 67.5"),
         (lambda: jg.RingGear(64, 3.0, face_width=20.0, helix_angle=10.0), "helix_angle"),

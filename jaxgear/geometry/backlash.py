@@ -8,9 +8,9 @@ from jaxtyping import Array, Float
 
 from ..numerics import Given, check, concrete, optional_real, program, real
 from .gear import Gear
-from .margins import play_between, thickening
+from .margins import distance_with, play_between
 from .pair import GearPair
-from .path import backlash_free_involute, pressure_angle_of, working_pressure_angle
+from .path import working_pressure_angle
 
 Scalar = Float[Array, ""]
 By = Literal["both", "pinion", "wheel", "center_distance"]
@@ -80,12 +80,7 @@ def _play(pinion: Gear, wheel: Gear, center_distance: Scalar | None) -> Scalar:
     return play_between(pinion, wheel, jnp.tan(working_pressure_angle(pinion, wheel, center_distance)))
 
 
-@program
-def _distance(pinion: Gear, wheel: Gear, backlash: Scalar) -> Scalar:
-    """Centre distance [mm] at which two gears have a backlash [um]."""
-    both = pinion.base_radius + wheel.base_radius
-    opened = 0.5e-3 * (backlash + thickening(pinion, wheel)) / both
-    return wheel.signed(both) / jnp.cos(pressure_angle_of(backlash_free_involute(pinion, wheel) + opened))
+_distance = program(distance_with)
 
 
 def _check_enough(backlash: Scalar, play: Scalar) -> None:

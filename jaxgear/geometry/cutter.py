@@ -74,18 +74,21 @@ class Cutter(NamedTuple):
         return (self.gear_base_radius + self.base_radius) * self.tangent
 
     @property
+    def involute_roll_length(self) -> Number:
+        """Roll length of the cutter at which its involute ends and its rounding begins [mm]."""
+        of = _library(self.base_radius)
+        own = of.maximum(self.center_radius**2 - self.base_radius**2, (1e-6 * self.base_radius) ** 2)
+        return of.sqrt(own) + self.rounding
+
+    @property
     def form_roll_length(self) -> Number:
         """Roll length of the gear at which fillet and involute meet [mm]; negative in undercut."""
-        of = _library(self.base_radius)
-        own = of.sqrt(of.maximum(self.center_radius**2 - self.base_radius**2, (1e-6 * self.base_radius) ** 2))
-        return self.line_length - own - self.rounding
+        return self.line_length - self.involute_roll_length
 
     @property
     def involute_radius(self) -> Number:
         """Radius of the cutter at which its involute ends and its rounding begins [mm]."""
-        of = _library(self.base_radius)
-        own = of.sqrt(of.maximum(self.center_radius**2 - self.base_radius**2, (1e-6 * self.base_radius) ** 2))
-        return of.sqrt(self.base_radius**2 + (own + self.rounding) ** 2)
+        return _library(self.base_radius).sqrt(self.base_radius**2 + self.involute_roll_length**2)
 
     @property
     def tip_half_width(self) -> Number:
@@ -101,8 +104,9 @@ def rolling(
     pressure_angle: Number,
     generating_shift: Number,
     cutter_shift: Number,
-    height: Number,
     radius: Number,
+    height: Number | None = None,
+    root_circle_radius: Number | None = None,
 ) -> Cutter:
     """Cutter in mesh with a spur gear.
 
@@ -111,17 +115,25 @@ def rolling(
         module: module [mm].
         pressure_angle: pressure angle of the basic rack [deg].
         generating_shift, cutter_shift: profile shift coefficients x_E of the gear and x_0 of the cutter.
-        height, radius: addendum h_a0 and tip radius rho_a0 of the cutter, in modules.
+        radius: tip radius rho_a0 of the cutter, in modules.
+        height: addendum h_a0 of the cutter, in modules; None for the one that reaches the root circle.
+        root_circle_radius: root circle radius of the gear, where the addendum of the cutter is None [mm].
     """
     of = _library(module)
     alpha = of.deg2rad(pressure_angle)
     tangent, cosine = of.tan(alpha), of.cos(alpha)
-    working = _generating_tangent(teeth, cutter_teeth, tangent, generating_shift + cutter_shift)
+    shift = generating_shift + cutter_shift
+    working = _tangent_of(_involute(tangent) + 2 * tangent * shift / (teeth + cutter_teeth))
     secant = of.sqrt(1 + working**2)
     reference, base = 0.5 * module * cutter_teeth, 0.5 * module * cutter_teeth * cosine
     gear_base = 0.5 * module * teeth * cosine
-    above = module * (cutter_shift + height - radius)  # the rounding's centre above the reference circle
-    center, rounding = reference + above, module * radius
+    rounding = module * radius
+    # the rounding's centre above the reference circle
+    if height is None:
+        above = (gear_base + base) * secant - root_circle_radius - reference - rounding
+    else:
+        above = module * (cutter_shift + height) - rounding
+    center = reference + above
     # inv(alpha_c) - inv(alpha) without a difference of large cutters' nearly equal numbers
     own = of.sqrt(of.maximum((center / base) ** 2 - 1, 1e-12))
     apart = above * (center + reference) / (base**2 * (own + tangent))
@@ -139,24 +151,6 @@ def rolling(
         gap,
         np.pi / cutter_teeth,
     )
-
-
-def generating_center_distance(teeth: Number, cutter_teeth: Number, alpha: Number, shift: Number) -> Number:
-    """Generating centre distance a_0 of a spur gear and its cutter, in modules; negative for an internal gear.
-
-    Args:
-        teeth, cutter_teeth: numbers of teeth z and z_0.
-        alpha: pressure angle [rad].
-        shift: sum of the profile shift coefficients x_E of the gear and x_0 of the cutter.
-    """
-    of = _library(alpha)
-    working = _generating_tangent(teeth, cutter_teeth, of.tan(alpha), shift)
-    return 0.5 * (teeth + cutter_teeth) * of.cos(alpha) * of.sqrt(1 + working**2)
-
-
-def _generating_tangent(teeth: Number, cutter_teeth: Number, tangent: Number, shift: Number) -> Number:
-    """tan(alpha_w0) with inv(alpha_w0) = inv(alpha) + 2 tan(alpha) (x_E + x_0) / (z + z_0)."""
-    return _tangent_of(_involute(tangent) + 2 * tangent * shift / (teeth + cutter_teeth))
 
 
 def full_rounding(cutter_teeth: Number, pressure_angle: Number, cutter_shift: Number, height: Number) -> Number:

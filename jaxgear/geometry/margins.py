@@ -17,7 +17,7 @@ from .gear import CHAMFER_ACCURACY, Gear, degrees_meant, shape_faults
 from .interference import Tips, fillet_clearance, radial_assembly_clearance, trochoid_clearance
 from .involute import diameter, involute
 from .outline import Outline, outline
-from .path import PathOfContact, backlash_free_involute, pressure_angle_of
+from .path import PathOfContact, backlash_free_involute, center_distance_at
 
 Scalar = Float[Array, ""]
 
@@ -311,16 +311,16 @@ def _ring_faults(margins: Margins, missed: set[str]) -> list[str]:
 def _backlash_fault(pinion: Gear, wheel: Gear, center_distance: Given | None) -> str:
     assert center_distance is not None  # that of None leaves no backlash to miss
     bound = "at most" if wheel.is_internal else "at least"
-    free = float(free_distance(pinion, wheel)) * (1 - wheel.signed(_DISTANCE_ACCURACY))
+    free = float(distance_with(pinion, wheel)) * (1 - wheel.signed(_DISTANCE_ACCURACY))
     unit = "mm (backlash-free)"
     return f"GearPair: center_distance = {float(center_distance):g} {unit} must be {bound} {free:g} {unit}"
 
 
-def free_distance(pinion: Gear, wheel: Gear) -> Scalar:
-    """Backlash-free centre distance at the mean tooth thicknesses [mm]."""
+def distance_with(pinion: Gear, wheel: Gear, backlash: Given = 0.0) -> Scalar:
+    """Centre distance at which the mean tooth thicknesses leave a backlash on the line of action [um], in mm."""
     both = pinion.base_radius + wheel.base_radius
-    wanted = backlash_free_involute(pinion, wheel) + 0.5e-3 * thickening(pinion, wheel) / both
-    return wheel.signed(both) / jnp.cos(pressure_angle_of(wanted))
+    opened = 0.5e-3 * (backlash + thickening(pinion, wheel)) / both
+    return center_distance_at(both, backlash_free_involute(pinion, wheel) + opened)
 
 
 def rounded_by(pinion: Gear, wheel: Gear, center_distance: Given) -> float:

@@ -10,7 +10,7 @@ from jaxtyping import Array, Bool, Float, PyTree
 
 from ..numerics import Checked, changed, concrete, number, on_both, program, real
 from .gear import Gear, with_diameters
-from .margins import Margins, faults_between, free_distance, margins_between, play_between, rounded_by
+from .margins import Margins, distance_with, faults_between, margins_between, play_between, rounded_by
 from .outline import Outline, outline
 from .path import PathOfContact, path_between, working_pressure_angle
 
@@ -256,7 +256,7 @@ def _unrounded(pair: GearPair, center_distance: Scalar) -> Scalar:
     return real(free)
 
 
-_free_distance = program(free_distance)
+_free_distance = program(distance_with)
 
 
 def _faults(pair: GearPair) -> tuple[str, ...]:

@@ -93,11 +93,24 @@ def pressure_angle_of(target: Real) -> Real:
     return jnp.arctan(bracketed_root(_missing_involute, low, high, target))
 
 
+def center_distance_at(base_radii: Real, target: Real) -> Real:
+    """Centre distance (r_b1 + r_b2) / cos(alpha_w) [mm], positive, at the involute function inv(alpha_w) [rad]."""
+    return jnp.abs(base_radii) / jnp.cos(pressure_angle_of(target))
+
+
 def backlash_free_involute(pinion: Gear, wheel: Gear) -> Real:
+    """Involute function of the backlash-free operating pressure angle of two gears [rad]."""
+    return free_involute(
+        pinion.profile_shift + wheel.profile_shift,
+        pinion.teeth + wheel.signed(wheel.teeth),
+        jnp.deg2rad(pinion.pressure_angle),
+        pinion.transverse_pressure_angle,
+    )
+
+
+def free_involute(shift: Real, teeth: Real, normal: Real, transverse: Real) -> Real:
     """inv(alpha_wt) = inv(alpha_t) + 2 tan(alpha_n) (x1 + x2) / (z1 + z2) [rad] (ISO 21771)."""
-    tangent = jnp.tan(jnp.deg2rad(pinion.pressure_angle))
-    shift = (pinion.profile_shift + wheel.profile_shift) / (pinion.teeth + wheel.signed(wheel.teeth))
-    return involute(jnp.tan(pinion.transverse_pressure_angle)) + 2 * tangent * shift
+    return involute(jnp.tan(transverse)) + 2 * jnp.tan(normal) * shift / teeth
 
 
 def _missing_involute(tangent: Real, wanted: Real) -> Real:

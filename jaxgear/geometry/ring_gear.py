@@ -8,8 +8,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ..numerics import concrete, number, real
-from .cutter import generating_center_distance
-from .gear import CHAMFER_ACCURACY, Gear, Shape, tip_faults
+from .gear import Gear, Shape
 
 Scalar = Float[Array, ""]
 Real = Float[Array, "*gears"]  # one number of each gear, where `jax.vmap` made many
@@ -78,16 +77,9 @@ class RingGear(Gear):
 
     def _tool_height(self) -> Any:
         """Addendum of the cutter that reaches the root circle, in modules."""
-        of = np if isinstance(self.module, np.ndarray) else jnp
-        assert self.cutter_teeth is not None and self.cutter_profile_shift is not None
-        distance = generating_center_distance(
-            -self.teeth,
-            self.cutter_teeth,
-            of.deg2rad(self.pressure_angle),
-            self._generating_shift() + self.cutter_profile_shift,
-        )
-        root = -0.5 * self.teeth + self._generating_shift() - self.dedendum
-        return distance - root - 0.5 * self.cutter_teeth - self.cutter_profile_shift
+        cutter = self._cutter_of(0.0)  # its tip does not depend on its rounding
+        assert cutter is not None and self.cutter_teeth is not None
+        return cutter.tip_radius / self.module - 0.5 * self.cutter_teeth - self.cutter_profile_shift
 
     @property
     def bore_radius(self) -> Real:
@@ -109,27 +101,11 @@ class RingGear(Gear):
             found["rim_diameter"] = self.module * (given - 2 * deeper + 2 * self.dedendum + 2 * _USUAL_RIM)
         return found
 
-    def faults_of(self, shape: Shape) -> tuple[str, ...]:
-        tip, form, base, root, rim = shape.diameters
-        faults = []
-        if not shape.height > 0:
-            name = "addendum" if self.tip_diameter is None else "tip_diameter"
-            faults.append(
-                f"RingGear: {name}: tip diameter = {tip:.6g} mm must be greater than {base:.6g} mm, the base diameter, "
-                f"and less than {root:.6g} mm, the root diameter"
-            )
-        else:
-            faults += tip_faults(self, shape)
-        if not shape.chamfer >= -CHAMFER_ACCURACY or not form < root:
-            faults.append(
-                f"RingGear: tip_form_diameter = {form:.6g} mm must be at least {tip:.6g} mm, the tip diameter, and "
-                f"less than {root:.6g} mm"
-            )
-        if not shape.rim > 0:
-            faults.append(
-                f"RingGear: rim_diameter = {rim:.6g} mm must be greater than {root:.6g} mm, the root diameter"
-            )
-        return tuple(faults)
+    def _body_faults(self, shape: Shape) -> tuple[str, ...]:
+        if shape.rim > 0:
+            return ()
+        least = f"{shape.root:.6g} mm, the root diameter"
+        return (f"RingGear: rim_diameter = {shape.bore:.6g} mm must be greater than {least}",)
 
 
 def _usual_cutter_teeth(teeth: Scalar) -> Scalar:

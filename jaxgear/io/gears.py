@@ -49,7 +49,14 @@ def _modification(key: str, value: Any) -> Template | FlankFileSection:
 _MODIFICATIONS = list_of(ValueType("a table", _modification), empty=True)
 
 
-class GearSection(_ProfileKeys, _ThicknessKeys, _GearKeys):  # type: ignore[misc, valid-type]
+class _FlankKeys(FileTable):
+    material: str | Template | None = entry(MATERIAL)
+    quality_class: int | None = entry(QUALITY_CLASS)
+    modification: list[Template | FlankFileSection] = entry(_MODIFICATIONS, [])
+    coast_modification: list[Template | FlankFileSection] | None = entry(_MODIFICATIONS)
+
+
+class GearSection(_FlankKeys, _ProfileKeys, _ThicknessKeys, _GearKeys):  # type: ignore[misc, valid-type]
     """A gear and the modifications of its flanks.
 
     The tooth thickness is given in one of three ways: as the allowance E_sns, with the tolerance T_sn down to E_sni
@@ -76,13 +83,8 @@ class GearSection(_ProfileKeys, _ThicknessKeys, _GearKeys):  # type: ignore[misc
 
     source = Gear
 
-    material: str | Template | None = entry(MATERIAL)
-    quality_class: int | None = entry(QUALITY_CLASS)
-    modification: list[Template | FlankFileSection] = entry(_MODIFICATIONS, [])
-    coast_modification: list[Template | FlankFileSection] | None = entry(_MODIFICATIONS)
 
-
-class RingSection(_RingKeys):  # type: ignore[misc, valid-type]
+class RingSection(_FlankKeys, _RingKeys):  # type: ignore[misc, valid-type]
     """A ring gear in place of the wheel, and the modifications of its flanks.
 
     Attributes:
@@ -90,11 +92,6 @@ class RingSection(_RingKeys):  # type: ignore[misc, valid-type]
     """
 
     source = RingGear
-
-    material: str | Template | None = entry(MATERIAL)
-    quality_class: int | None = entry(QUALITY_CLASS)
-    modification: list[Template | FlankFileSection] = entry(_MODIFICATIONS, [])
-    coast_modification: list[Template | FlankFileSection] | None = entry(_MODIFICATIONS)
 
 
 AnyGear = GearSection | RingSection

@@ -7,7 +7,7 @@ from jaxtyping import Array, Float
 
 from ..geometry import GearPair
 from ..geometry.involute import involute
-from ..geometry.path import pressure_angle_of
+from ..geometry.path import center_distance_at, free_involute
 from ..numerics import Checked, Given, concrete, number
 
 Scalar = Float[Array, ""]
@@ -118,14 +118,13 @@ class StageGears(Checked):
         """Backlash-free centre distances of sun and planet and of planet and ring without allowances [mm]."""
         return (
             self._free_distance(self.sun_teeth + self.planet_teeth, self.sun_profile_shift),
-            self._free_distance(self.ring_teeth - self.planet_teeth, -self.ring_profile_shift, -1.0),
+            self._free_distance(self.planet_teeth - self.ring_teeth, self.ring_profile_shift),
         )
 
-    def _free_distance(self, teeth: Scalar, shift: Scalar, sign: float = 1.0) -> Scalar:
-        """m z / 2 cos(alpha) / cos(alpha_w), inv(alpha_w) = inv(alpha) + 2 tan(alpha) (x + sign x_p) / z."""
-        tangent = jnp.tan(self._rack_angle)
-        target = involute(tangent) + 2 * tangent * (shift + sign * self.planet_profile_shift) / teeth
-        return 0.5 * self.module * teeth * jnp.cos(self._rack_angle) / jnp.cos(pressure_angle_of(target))
+    def _free_distance(self, teeth: Scalar, shift: Scalar) -> Scalar:
+        """Backlash-free centre distance [mm] of a sum of teeth and one of profile shifts, as of `GearPair`."""
+        target = free_involute(shift + self.planet_profile_shift, teeth, self._rack_angle, self._rack_angle)
+        return center_distance_at(self.base_radius(teeth), target)
 
     @property
     def _rack_angle(self) -> Scalar:
