@@ -15,7 +15,15 @@ from catalogue import FOUR_PAIRS, LINE, gear_pair, prepare, solve
 
 import jaxgear as jg
 from jaxgear.geometry import RingGear
-from jaxgear.planetary import PlanetaryStage, StageGears, prepare_stage, solve_stage
+from jaxgear.planetary import (
+    PlanetaryStage,
+    StageGears,
+    StageMeshes,
+    mesh_cycles,
+    planet_phases,
+    prepare_stage,
+    solve_stage,
+)
 
 PLANETS, PIN, FORCE = 4, 500.0, 3000.0
 RELIEF = jg.TipRelief(6.0, 4.0)
@@ -50,12 +58,24 @@ def test_meshes_in_phase_are_springs_in_series():
     cycle = solved(stage)
     assert cycle.converged.all() and cycle.residual.max() < 1e-9
     np.testing.assert_allclose(cycle.load_share, 1.0, atol=1e-9)
-    errors = []
-    for teeth, flanks in (((24, 18), {"wheel": RELIEF}), ((18, 60), {})):
+    meshes, errors, pairs = mesh_cycles(stage, cycle, speed=1400.0), [], []
+    for found, teeth, flanks in ((meshes.sun, (24, 18), {"wheel": RELIEF}), (meshes.ring, (18, 60), {})):
         mesh = mesh_of(*teeth)
         pair = solve(mesh, FORCE * 1e-3 * mesh.pair.pinion.base_radius, **flanks)
         errors.append(np.asarray(pair.transmission_error - mesh.hub * pair.force / mesh.pair.face_width))
         assert np.isclose(pair.phase[0], 0.0)
+        np.testing.assert_allclose(found.transmission_error, [errors[-1]] * PLANETS, atol=1e-9)
+        np.testing.assert_allclose(found.line_load, [pair.line_load] * PLANETS, rtol=1e-7, atol=1e-7)
+        pairs.append(jax.tree.map(lambda leaf: jnp.broadcast_to(leaf, (PLANETS, *leaf.shape)), pair))
+    # the largest values of pairs under that force
+    twin = StageMeshes(*pairs)
+    for name in ("flank_pressure", "corner_pressure", "root_stress"):
+        np.testing.assert_allclose(getattr(meshes, name), getattr(twin, name), rtol=1e-7)
+    assert np.isclose(meshes.max_flank_pressure, pair.contact_pressure.max())
+    # relative to the carrier, which turns with 24/84 of the sun
+    np.testing.assert_allclose(
+        [meshes.sun.operating_point.speed[0], meshes.ring.operating_point.speed[0]], [1e3, 4e3 / 3]
+    )
     pins = (2 * np.cos(np.deg2rad(20))) ** 2 * FORCE / PIN
     windup = float(stage.sun.windup + stage.ring.windup) * PLANETS * FORCE
     assert windup > 0.1
@@ -65,24 +85,39 @@ def test_meshes_in_phase_are_springs_in_series():
 
 def test_counter_phased_planets_suppress_odd_harmonics():
     """26/18/62 and four planets, with the forces of equal planets at their own phases."""
-    cycle = solved(prepared(26, 62))
+    stage = prepared(26, 62)
+    cycle = solved(stage)
     assert cycle.converged.all()
     np.testing.assert_allclose(cycle.mean_load_share, 1.0, atol=1e-6)
     odd, even = np.asarray(cycle.orders(4).amplitude)[::2], np.asarray(cycle.orders(4).amplitude)[1::2]
     assert odd.max() < 1e-3 < 1e-2 < even.max()
     np.testing.assert_allclose(cycle.sun_force[0], np.roll(cycle.sun_force[1], LINE.positions // 2), rtol=1e-9)
+    # contacts at the mesh positions of every planet carry the force of the equilibrium there
+    meshes = mesh_cycles(stage, cycle)
+    for found, phases, force in zip(
+        (meshes.sun, meshes.ring), planet_phases(stage.stage), (cycle.sun_force, cycle.ring_force)
+    ):
+        place = (
+            np.round((np.asarray(found.phase) - np.asarray(phases)[:, None]) * LINE.positions).astype(int)
+            % LINE.positions
+        )
+        carried = np.sum(found.pair_force, axis=1)
+        np.testing.assert_allclose(carried, np.take_along_axis(np.asarray(force), place, axis=1), rtol=1e-9)
+        np.testing.assert_allclose(found.force, np.mean(carried, axis=1), rtol=1e-12)
 
 
 @pytest.mark.slow
 def test_derivatives_by_relief_and_pin_error():
-    """K_gamma and PPTE against central differences."""
+    """K_gamma, PPTE, flank pressure and root stress against central differences."""
     stage = prepared(26, 62)
 
     def numbers(amount, late):
         errors = jnp.zeros(PLANETS)
         one = eqx.tree_at(lambda p: p.stage.tangential_pin_error, stage, errors)
         cycle = solved(one, jg.TipRelief(amount, 4.0))
-        return jnp.stack([cycle.load_sharing_factor, jg.peak_to_peak(cycle.transmission_error)])
+        meshes = mesh_cycles(one, cycle)
+        stresses = meshes.max_flank_pressure, meshes.root_stress.planet_to_ring[0]
+        return jnp.stack([cycle.load_sharing_factor, jg.peak_to_peak(cycle.transmission_error), *stresses])
 
     at, step = jnp.asarray([6.0, -15.0]), 1e-3
     exact = jax.jit(jax.jacrev(lambda both: numbers(*both)))(at)

@@ -17,7 +17,7 @@ import pytest
 from matplotlib.patches import Wedge
 
 import jaxgear as jg
-from jaxgear.planetary import PlanetaryStage, StageGears, TableMesh, figures, prepare_stage, solve_stage
+from jaxgear.planetary import PlanetaryStage, StageGears, TableMesh, figures, mesh_cycles, prepare_stage, solve_stage
 
 matplotlib.use("Agg")
 
@@ -196,6 +196,7 @@ def test_another_stage_of_the_same_gears():
         (lambda p: solve_stage(p, [1.0, 2.0]), r"torque has shape \(2,\), must be a single number"),
         (lambda p: solve_stage(p, 1.0, sun=jg.TipRelief(5.0, 2.0)), "a table holds the modifications of its flanks"),
         (lambda p: solve_stage(p.stage, 1.0), "prepared is a PlanetaryStage, must be a PreparedStage"),
+        (lambda p: mesh_cycles(p, solve_stage(p, 1.0)), "sun is a table, which holds no contacts"),
         (lambda p: prepare_stage(p.stage, sun=p, ring=p), "sun is a PreparedStage, must be a prepared mesh or"),
         (lambda p: TableMesh(np.zeros((4, 3)), np.arange(4.0), 20.0), "approach has 3 columns, must have .* 4 loads"),
     ],

@@ -11,7 +11,7 @@ from .face_coupling import check_torque
 from .mesh import Mesh
 from .operating_point import Torque, operating_point_of
 from .slide import RemovedMaterial, for_contact, loaded_material
-from .solve import check_mesh, contact_of, contact_status, flanks_of, pair_forces
+from .solve import check_mesh, contact_of, contact_status, flanks_of, pair_forces, teeth_in_contact
 from .status import Status, Statuses, WithStatus, status_of
 
 # Newton steps of a mesh of several slices from the approach of all springs in series to that of the teeth: the force of
@@ -122,6 +122,13 @@ def solve_at_material(
         residual=solution.residual,
         status=contact_status(mesh, contact, error, removed),
     )
+
+
+@program
+def cycle_at_material(mesh: Mesh, approach: Curve, removed: RemovedMaterial) -> dict[str, Array]:
+    """Fields of a `MeshCycle` at a prescribed approach of the teeth, its transmission error."""
+    gap = mesh.corner_gap + removed.amount
+    return teeth_in_contact(mesh, contact_of(mesh, gap, removed.shift, approach=approach), gap, removed)
 
 
 class ForcedContact(WithStatus, eqx.Module):

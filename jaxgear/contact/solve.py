@@ -76,7 +76,7 @@ def solve(
     pinion, wheel = flanks_of(mesh, pinion, wheel)
     # two programs: that of the contact, by far the longer one to compile, serves every kind of modification
     removed = material_of(mesh, operating_point.torque, pinion, wheel)
-    cycle = _cycle(
+    cycle = mesh_cycle(
         mesh, operating_point, _solve_removed(for_contact(mesh), operating_point.torque, removed), pinion, wheel
     )
     wider = wider_mesh(mesh, cycle.status)
@@ -113,7 +113,7 @@ def solve_removed(
     if shape != wanted:
         raise ValueError(f"removed has shape {shape}, must be {wanted} (pairs, slices, positions)")
     removed = removed if isinstance(removed, RemovedMaterial) else as_removed(mesh.resolution, removed)
-    return _cycle(
+    return mesh_cycle(
         mesh, operating_point, _solve_removed(for_contact(mesh), operating_point.torque, removed), pinion, wheel
     )
 
@@ -129,7 +129,7 @@ def solve_known(
 ) -> MeshCycle:
     """`solve` where the solution is known, its approach as transmission error: derivatives, without any iteration."""
     removed = material_of(mesh, point.torque, pinion, wheel)
-    return _cycle(mesh, point, _solve_removed(for_contact(mesh), point.torque, removed, known), pinion, wheel)
+    return mesh_cycle(mesh, point, _solve_removed(for_contact(mesh), point.torque, removed, known), pinion, wheel)
 
 
 def removed_material(
@@ -234,7 +234,13 @@ def flanks_of(
     return pinion or NoModification(), wheel or NoModification()
 
 
-def _cycle(mesh: Mesh, operating_point: OperatingPoint, contact: dict[str, Any], pinion=None, wheel=None) -> MeshCycle:
+def mesh_cycle(
+    mesh: Mesh,
+    operating_point: OperatingPoint,
+    contact: dict[str, Any],
+    pinion: AbstractModification | None,
+    wheel: AbstractModification | None,
+) -> MeshCycle:
     """Mesh cycle of a contact; the inputs do not pass through the compiled programs, which would copy them."""
     return MeshCycle(
         kinematics=mesh.kinematics,
@@ -450,23 +456,32 @@ def _solve_removed(
     windup = mesh.hub * force / mesh.pair.face_width
     known = known and known._replace(approach=known.approach - windup)
     contact = contact_of(mesh, gap, removed.shift, load=force, known=known)
-    solution = contact.solution
-    unloaded = minimum(contact.gap / mesh.lever, axis=(0, 1))
-    status = contact_status(mesh, contact, solution.approach, removed)
+    found = teeth_in_contact(mesh, contact, gap, removed)
+    status = found["status"]
     if mesh.support_torque is not None:
         status = status_of({Status.OUT_OF_VALIDITY: ~holds_at(mesh.support_torque, torque)}, status)
+    return found | {
+        "transmission_error": found["transmission_error"] + windup,
+        "tangent_stiffness": 1 / (1 / contact.tangent_stiffness + mesh.hub / mesh.pair.face_width),
+        "status": status,
+    }
+
+
+def teeth_in_contact(mesh: Mesh, contact: Contact, gap: Load, removed: RemovedMaterial) -> dict[str, Array]:
+    """Fields of a mesh cycle by its contact, without wind-up of the bodies."""
+    solution = contact.solution
     return {
-        "transmission_error": solution.approach + windup,
-        "unloaded_transmission_error": unloaded,
+        "transmission_error": solution.approach,
+        "unloaded_transmission_error": minimum(contact.gap / mesh.lever, axis=(0, 1)),
         "line_load": solution.line_load,
         "pair_force": pair_forces(mesh, solution.line_load),
         "opening": solution.opening,
         "gap": gap,
         "shift": removed.shift,
         "relative_curvature": removed.relative_curvature,
-        "tangent_stiffness": 1 / (1 / contact.tangent_stiffness + mesh.hub / mesh.pair.face_width),
+        "tangent_stiffness": contact.tangent_stiffness,
         "residual": solution.residual,
-        "status": status,
+        "status": contact_status(mesh, contact, solution.approach, removed),
     }
 
 

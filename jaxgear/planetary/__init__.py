@@ -6,6 +6,8 @@ stage = PlanetaryStage(gears, 3, radial_pin_stiffness=400.0, tangential_pin_stif
 prepared = prepare_stage(stage, sun=jaxgear.prepare(sun_planet), ring=jaxgear.prepare(planet_ring))
 cycle = solve_stage(prepared, 400.0, planet_to_sun=jaxgear.TipRelief(10.0, 4.0))
 cycle.load_sharing_factor, cycle.orders(6).amplitude
+meshes = mesh_cycles(prepared, cycle)
+meshes.max_flank_pressure, meshes.root_stress.planet_to_ring
 """
 
 from .cycle import StageCycle as StageCycle
@@ -15,14 +17,20 @@ from .kinematics import Phasing as Phasing
 from .kinematics import gear_ratio as gear_ratio
 from .kinematics import member_speeds as member_speeds
 from .kinematics import member_torques as member_torques
+from .kinematics import mesh_force as mesh_force
 from .kinematics import mesh_frequency as mesh_frequency
 from .kinematics import output_member as output_member
 from .kinematics import phasing as phasing
 from .kinematics import planet_phases as planet_phases
+from .mesh_cycles import PerFlank as PerFlank
+from .mesh_cycles import PerMesh as PerMesh
+from .mesh_cycles import StageMeshes as StageMeshes
+from .mesh_cycles import mesh_cycles as mesh_cycles
 from .meshes import AbstractLoadedMesh as AbstractLoadedMesh
 from .meshes import AbstractPlacedMesh as AbstractPlacedMesh
 from .meshes import AbstractStageMesh as AbstractStageMesh
 from .meshes import MeshForces as MeshForces
+from .meshes import StageFlanks as StageFlanks
 from .meshes import TableMesh as TableMesh
 from .solve import PreparedStage as PreparedStage
 from .solve import prepare_stage as prepare_stage

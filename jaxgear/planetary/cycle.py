@@ -12,6 +12,7 @@ from ..metrics import Harmonics, harmonics
 from ..numerics import Checked, maximum, result, safe_sqrt
 from .equilibrium import Equilibrium
 from .kinematics import member_torques
+from .meshes import StageFlanks
 from .stage import PlanetaryStage
 
 Curve = Float[Array, " positions"]
@@ -31,6 +32,8 @@ class StageCycle(WithStatus, Checked):
         transmission_error: rotation of the sun on its base circle against ring and carrier [um], shape (positions,).
         sun_force, ring_force: force of every planet's mesh with sun and ring on the line of action [N], shape (planets,
             positions).
+        sun_approach, ring_approach: approach of the teeth in these meshes on the line of action [um], zero where
+            unmodified teeth begin to touch, shape (planets, positions).
         bearing_force: radial and tangential force of every planet on its pin [N], shape (2, planets, positions).
         sun_displacement, ring_displacement, carrier_displacement: displacement (x, y) of the centres [um], shape (2,
             positions); zero with a rigid support.
@@ -39,6 +42,7 @@ class StageCycle(WithStatus, Checked):
         residual: largest force that is left over, relative to the sum of the mesh forces, shape (positions,).
         loose: True where nothing holds a floating member in some direction, so that its displacement is not determined,
             shape (positions,).
+        flanks: modifications of all flanks.
         status: of every position, of all contacts and the equilibrium, shape (positions,).
     """
 
@@ -47,6 +51,8 @@ class StageCycle(WithStatus, Checked):
     transmission_error: Curve = result("um")
     sun_force: Curves = result("N")
     ring_force: Curves = result("N")
+    sun_approach: Curves = result("um")
+    ring_approach: Curves = result("um")
     bearing_force: Float[Array, "2 planets positions"] = result("N")
     sun_displacement: Path = result("um")
     ring_displacement: Path = result("um")
@@ -54,10 +60,19 @@ class StageCycle(WithStatus, Checked):
     planet_displacement: Float[Array, "3 planets positions"] = result("um")
     residual: Curve = result()
     loose: Bool[Array, " positions"] = eqx.field()
+    flanks: StageFlanks = eqx.field()
     status: Statuses = result()
 
     @classmethod
-    def of(cls, stage: PlanetaryStage, torque: Scalar, found: Equilibrium, windup: Scalar) -> Self:
+    def of(
+        cls,
+        stage: PlanetaryStage,
+        torque: Scalar,
+        found: Equilibrium,
+        windup: Scalar,
+        approach: Float[Array, "2 planets positions"],
+        flanks: StageFlanks,
+    ) -> Self:
         """The cycle of an equilibrium; `windup` of sun and ring is added to its transmission error [um]."""
         rotation, moving = found.motion.central[0], found.motion.central[1:]
         supports = {"sun": stage.sun_support, "ring": stage.ring_support, "carrier": stage.carrier_support}
@@ -72,6 +87,8 @@ class StageCycle(WithStatus, Checked):
             transmission_error=rotation + windup,
             sun_force=found.springs[0],
             ring_force=found.springs[1],
+            sun_approach=approach[0],
+            ring_approach=approach[1],
             bearing_force=found.springs[2:],
             sun_displacement=places["sun"],
             ring_displacement=places["ring"],
@@ -79,6 +96,7 @@ class StageCycle(WithStatus, Checked):
             planet_displacement=found.motion.local,
             residual=found.residual,
             loose=found.loose,
+            flanks=flanks,
             status=found.status,
         )
 

@@ -52,6 +52,16 @@ def member_torques(stage: PlanetaryStage, torque: Given) -> Members:
     return Members(sun, sun * ratio, -sun * (1 + ratio), jnp.zeros_like(sun))
 
 
+def mesh_force(stage: PlanetaryStage, torque: Given) -> Scalar:
+    """Sum of the forces of all planets' meshes with the sun on the line of action [N], and of those with the ring.
+
+    Args:
+        stage: the stage.
+        torque: size of the torque on the driving member [N m].
+    """
+    return 1e3 * member_torques(stage, torque).sun / stage.gears.base_radius(stage.gears.sun_teeth)
+
+
 def member_speeds(stage: PlanetaryStage, speed: Given) -> Members:
     """Speeds of all members [rpm]; all positive ones turn the same way.
 

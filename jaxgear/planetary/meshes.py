@@ -16,7 +16,7 @@ from jaxtyping import Array, Float, Int, Shaped
 from ..compliance.tooth import tooth_load
 from ..contact import Mesh
 from ..contact.mesh import prepare_from
-from ..contact.prescribed import PrescribedContact, solve_at_material
+from ..contact.prescribed import PrescribedContact, cycle_at_material, solve_at_material
 from ..contact.slide import RemovedMaterial, for_contact
 from ..contact.solve import check_mesh, flanks_of, material_of
 from ..contact.status import Status, Statuses, status_of
@@ -28,6 +28,31 @@ from ..numerics.spline import interpolate
 Scalar = Float[Array, ""]
 Curves = Float[Array, "planets positions"]
 Planets = Float[Array, " planets"]
+Flanks = tuple[AbstractModification | None, AbstractModification | None]  # of pinion and wheel of one mesh
+
+
+class StageFlanks(NamedTuple):
+    """Modifications of the flanks that carry; None for nominal involutes.
+
+    Attributes:
+        sun, planet_to_sun: of the mesh with the sun.
+        planet_to_ring, ring: of the mesh with the ring.
+    """
+
+    sun: AbstractModification | None = None
+    planet_to_sun: AbstractModification | None = None
+    planet_to_ring: AbstractModification | None = None
+    ring: AbstractModification | None = None
+
+    @property
+    def at_sun(self) -> Flanks:
+        """Flanks of the mesh with the sun."""
+        return self.sun, self.planet_to_sun
+
+    @property
+    def at_ring(self) -> Flanks:
+        """Flanks of the mesh with the ring."""
+        return self.planet_to_ring, self.ring
 
 
 class MeshForces(NamedTuple):
@@ -286,6 +311,10 @@ class LoadedMesh(AbstractLoadedMesh):
             approach: at the positions of the stage [um], shape (planets, positions).
         """
         return eqx.filter_vmap(solve_at_material)(self.mesh, _rolled(approach, -self.steps), self.removed)
+
+    def cycles(self, approach: Curves) -> dict[str, Array]:
+        """Fields of a mesh cycle of every planet, with the planets as an axis in front; arguments as of `contact`."""
+        return eqx.filter_vmap(cycle_at_material)(self.mesh, _rolled(approach, -self.steps), self.removed)
 
     def forces(self, approach: Curves) -> MeshForces:
         """Forces at the positions of the stage."""

@@ -9,8 +9,8 @@ from ..microgeometry import AbstractModification
 from ..numerics import Given, check, program, real
 from .cycle import StageCycle
 from .equilibrium import equilibrium
-from .kinematics import member_torques, planet_phases
-from .meshes import AbstractPlacedMesh, AbstractStageMesh, PreparedMesh
+from .kinematics import mesh_force, planet_phases
+from .meshes import AbstractPlacedMesh, AbstractStageMesh, PreparedMesh, StageFlanks
 from .springs import linkage
 from .stage import PlanetaryStage
 
@@ -99,21 +99,21 @@ def solve_stage(
         raise ValueError(f"torque has shape {given.shape}, must be a single number; make many with jax.vmap")
     check("torque", given, "N m", low=0.0, open_low=True)
     given = given.astype(prepared.stage.gears.module.dtype)
-    return _solved(prepared, given, (sun, planet_to_sun), (planet_to_ring, ring))
-
-
-Flanks = tuple[AbstractModification | None, AbstractModification | None]
+    return _solved(prepared, given, StageFlanks(sun, planet_to_sun, planet_to_ring, ring))
 
 
 @program
-def _solved(prepared: PreparedStage, torque: Float[Array, ""], at_sun: Flanks, at_ring: Flanks) -> StageCycle:
+def _solved(prepared: PreparedStage, torque: Float[Array, ""], given: StageFlanks) -> StageCycle:
     stage, placed = prepared.stage, (prepared.sun, prepared.ring)
-    force = 1e3 * member_torques(stage, torque).sun / stage.gears.base_radius(stage.gears.sun_teeth)
+    force = mesh_force(stage, torque)
     springs = linkage(stage, force)
-    sun, ring = (mesh.loaded(force / stage.planets, *flanks) for mesh, flanks in zip(placed, (at_sun, at_ring)))
+    sun, ring = (
+        mesh.loaded(force / stage.planets, *flanks) for mesh, flanks in zip(placed, (given.at_sun, given.at_ring))
+    )
     widths = jnp.stack([mesh.width.astype(force.dtype) for mesh in placed])
     usual = jnp.concatenate([_USUAL_STIFFNESS * widths, springs.pin])
     guess = jnp.broadcast_to(usual[:, None, None], (len(usual), stage.planets, prepared.sun.positions))
     found = equilibrium(springs, (sun, ring), guess)
     windup = (prepared.sun.windup + prepared.ring.windup).astype(force.dtype) * force
-    return StageCycle.of(stage, torque, found, windup)
+    approach = springs.stretch(found.motion) - springs.offset[:, :, None]
+    return StageCycle.of(stage, torque, found, windup, approach[:2], given)
