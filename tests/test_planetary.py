@@ -114,3 +114,21 @@ def test_unequal_places():
 def test_what_cannot_be_built_is_refused(make, text):
     with pytest.raises(ValueError, match=text):
         make()
+
+
+@pytest.mark.parametrize(
+    ("fixed", "driving", "closed"),
+    [
+        ("ring", "sun", lambda i, eta: 1 - (1 - eta) * i / (i - 1)),
+        ("ring", "carrier", lambda i, eta: (i - 1) / (i / eta - 1)),
+        ("sun", "ring", lambda i, eta: (i - eta) / (i - 1)),
+        ("sun", "carrier", lambda i, eta: (i - 1) / (i - 1 / eta)),
+        ("carrier", "sun", lambda i, eta: eta),
+        ("carrier", "ring", lambda i, eta: eta),
+    ],
+)
+def test_efficiency_by_the_basic_efficiency(fixed, driving, closed):
+    """i_0 = -64/26; H. W. Mueller, Die Umlaufgetriebe."""
+    own = stage(26, 64, fixed=fixed, driving=driving)
+    assert np.isclose(planetary.stage_efficiency(own, 0.97), closed(-64 / 26, 0.97), rtol=1e-14)
+    assert np.isclose(planetary.stage_efficiency(own, 1.0), 1.0, rtol=1e-14)

@@ -23,6 +23,7 @@ from jaxgear.planetary import (
     planet_phases,
     prepare_stage,
     solve_stage,
+    stage_losses,
 )
 
 PLANETS, PIN, FORCE = 4, 500.0, 3000.0
@@ -58,7 +59,7 @@ def test_meshes_in_phase_are_springs_in_series():
     cycle = solved(stage)
     assert cycle.converged.all() and cycle.residual.max() < 1e-9
     np.testing.assert_allclose(cycle.load_share, 1.0, atol=1e-9)
-    meshes, errors, pairs = mesh_cycles(stage, cycle, speed=1400.0), [], []
+    meshes, errors, pairs = mesh_cycles(stage, cycle, speed=1400.0, friction=0.05), [], []
     for found, teeth, flanks in ((meshes.sun, (24, 18), {"wheel": RELIEF}), (meshes.ring, (18, 60), {})):
         mesh = mesh_of(*teeth)
         pair = solve(mesh, FORCE * 1e-3 * mesh.pair.pinion.base_radius, **flanks)
@@ -81,6 +82,27 @@ def test_meshes_in_phase_are_springs_in_series():
     assert windup > 0.1
     expected = errors[0] + np.roll(errors[1], -LINE.positions // 2) + pins + windup
     np.testing.assert_allclose(cycle.transmission_error, expected, atol=1e-7)
+
+
+def test_power_balance_of_losses():
+    """Losses of the flanks are missing at the carrier, but for their product: the ring's mesh passes on what the sun's
+    mesh has left."""
+    stage = prepared(24)
+    cycle = solved(stage)
+    meshes = mesh_cycles(stage, cycle, speed=1400.0, friction=0.05)
+    found = stage_losses(cycle, meshes, bearing_loss=100.0)
+    one, two = (1 - 0.05 * jg.quantities["mesh_loss_factor"](mesh)[0] for mesh in (meshes.sun, meshes.ring))
+    assert np.isclose(found.basic_efficiency, one * two)
+    assert np.isclose(found.input_power, cycle.torque * 1400 * np.pi / 30)
+    flanks = float(jnp.sum(found.sun_mesh_loss + found.ring_mesh_loss))
+    rolling = float(found.input_power) * 60 / 84
+    assert np.isclose(flanks - (1 - one) * (1 - two) * rolling + 100.0, found.loss_power, rtol=1e-9)
+    assert np.isclose(found.efficiency, 1 - (1 - one * two) * 60 / 84 - 100.0 / found.input_power)
+    oil = jg.metrics.Lubricant(100.0, 11.0, 60.0, 0.4)
+    bare = eqx.tree_at(lambda m: [each.operating_point.friction for each in (m.sun, m.ring)], meshes, [None, None])
+    assert 0.98 < stage_losses(cycle, bare, oil).efficiency < 1
+    with pytest.raises(ValueError, match="meshes have no speed"):
+        stage_losses(cycle, eqx.tree_at(lambda m: m.sun.operating_point.speed, meshes, None), oil)
 
 
 def test_counter_phased_planets_suppress_odd_harmonics():

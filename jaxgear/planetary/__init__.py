@@ -22,6 +22,9 @@ from .kinematics import mesh_frequency as mesh_frequency
 from .kinematics import output_member as output_member
 from .kinematics import phasing as phasing
 from .kinematics import planet_phases as planet_phases
+from .losses import StageLosses as StageLosses
+from .losses import stage_efficiency as stage_efficiency
+from .losses import stage_losses as stage_losses
 from .mesh_cycles import PerFlank as PerFlank
 from .mesh_cycles import PerMesh as PerMesh
 from .mesh_cycles import StageMeshes as StageMeshes
