@@ -1,12 +1,6 @@
-"""Equilibrium of planetary stages with the mesh tables of the reference, its invariants and derivatives.
-
-`planetary_reference.npz` holds finite-element meshes of 26/19/64 teeth, module 3 (approach [um] over 60 mesh positions
-and line load [N/mm]), and the quasi-static stage that was computed from them: transmission error, centre of the sun and
-forces of all planets.
-"""
+"""Equilibrium of planetary stages with the mesh tables of the reference, its invariants and derivatives."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import equinox as eqx
 import jax
@@ -15,36 +9,18 @@ import matplotlib
 import numpy as np
 import pytest
 from matplotlib.patches import Wedge
+from reference_stage import HELD, REFERENCE, TORQUE, prepared, stage
 
 import jaxgear as jg
-from jaxgear.planetary import PlanetaryStage, StageGears, TableMesh, figures, mesh_cycles, prepare_stage, solve_stage
+from jaxgear.planetary import TableMesh, figures, mesh_cycles, prepare_stage, solve_stage
 
 matplotlib.use("Agg")
 
-REFERENCE = np.load(Path(__file__).with_name("planetary_reference.npz"))
-WIDTH = 20.0
-HELD, FLOAT = 2000.0, 0.001
 LATE = -30.0
-TORQUE = {3: 400.0, 5: 650.0}
 
 
 def errors(planets, value=LATE):
     return np.r_[value, np.zeros(planets - 1)]
-
-
-def stage(planets=3, *, teeth=(26, 19, 64), pin=400.0, **options):
-    """Every error is an array, so that all stages of so many planets share one program."""
-    none = {name: np.zeros(planets) for name in ("radial_pin_error", "tangential_pin_error", "sun_gap", "ring_gap")}
-    given = {"sun_support": FLOAT, **none, **options}
-    return PlanetaryStage(
-        StageGears(*teeth, 3.0), planets, radial_pin_stiffness=pin, tangential_pin_stiffness=pin, **given
-    )
-
-
-def prepared(own, kind="none"):
-    load = REFERENCE["load"].astype(float)
-    meshes = {name: TableMesh(REFERENCE[f"{name}_{kind}"].astype(float), load, WIDTH) for name in ("sun", "ring")}
-    return prepare_stage(own, **meshes)
 
 
 def solved(own, kind="none", torque=None):

@@ -22,14 +22,14 @@ _BEARING = "(2, 2, 2) or (2, 3, 3): of pinion and wheel, along, across[, axial]"
 def inertia_of(gear: Gear) -> Scalar:
     """Moment of inertia of a gear body about its axis [kg m2]: a ring from the bore to the reference pitch circle.
 
-    It uses face width and density of the gear; a gear without `bore_diameter` is a solid disc. Oscillators accept other
-    inertias as an argument.
+    It uses face width and density of the gear; a gear without `bore_diameter` is a solid disc, and a ring gear reaches
+    from the pitch circle to its outer circle. Oscillators accept other inertias as an argument.
     """
     outer, inner = _radii(gear)
     return jnp.pi / 2 * gear.material.density * gear.face_width * _MM * (outer**4 - inner**4)
 
 
-def _mass_of(gear: Gear) -> Scalar:
+def mass_of(gear: Gear) -> Scalar:
     """Mass of the same body [kg]."""
     outer, inner = _radii(gear)
     return jnp.pi * gear.material.density * gear.face_width * _MM * (outer**2 - inner**2)
@@ -37,6 +37,8 @@ def _mass_of(gear: Gear) -> Scalar:
 
 def _radii(gear: Gear) -> tuple[Scalar, Scalar]:
     """Outer and inner radius of the gear body [m]."""
+    if gear.is_internal:
+        return jnp.abs(gear.bore_radius) * _MM, jnp.abs(gear.pitch_radius) * _MM
     inner = jnp.zeros_like(gear.module) if gear.bore_diameter is None else gear.bore_radius
     return gear.pitch_radius * _MM, inner * _MM
 
@@ -167,9 +169,7 @@ def on_bearings(
     """
     mass, force = equivalent_mass(pair, inertias), _force(pair, torque)
     c = _damping(mesh_force, mass, force, damping_ratio, damping, mean_stiffness)
-    bodies = _pair_of_numbers(
-        "masses", "kg", (_mass_of(pair.pinion), _mass_of(pair.wheel)) if masses is None else masses
-    )
+    bodies = _pair_of_numbers("masses", "kg", (mass_of(pair.pinion), mass_of(pair.wheel)) if masses is None else masses)
     held = _on_ground("bearing_stiffness", "N/um", bearing_stiffness, stiff=True)
     directions = len(held) // 2
     damped = None

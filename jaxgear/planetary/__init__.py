@@ -35,7 +35,14 @@ from .meshes import AbstractStageMesh as AbstractStageMesh
 from .meshes import MeshForces as MeshForces
 from .meshes import StageFlanks as StageFlanks
 from .meshes import TableMesh as TableMesh
+from .response import StageResponse as StageResponse
+from .response import stage_response as stage_response
 from .solve import PreparedStage as PreparedStage
 from .solve import prepare_stage as prepare_stage
 from .solve import solve_stage as solve_stage
 from .stage import PlanetaryStage as PlanetaryStage
+from .vibration import StageInertias as StageInertias
+from .vibration import StageModes as StageModes
+from .vibration import StageSystem as StageSystem
+from .vibration import natural_modes as natural_modes
+from .vibration import stage_system as stage_system

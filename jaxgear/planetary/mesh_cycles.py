@@ -83,6 +83,11 @@ class StageMeshes(eqx.Module):
         return PerFlank(*_peaks(self.sun).root_stress, *_peaks(self.ring).root_stress)
 
     @property
+    def mean_stiffness(self) -> PerMesh:
+        """Mean tangent stiffness of the teeth of every planet's mesh [N/um], without wind-up of the bodies."""
+        return PerMesh(*(jnp.mean(each.tangent_stiffness, axis=-1) for each in (self.sun, self.ring)))
+
+    @property
     def max_flank_pressure(self) -> Scalar:
         """Largest Hertzian pressure on the flanks of all meshes [MPa]."""
         return maximum(jnp.stack(self.flank_pressure))
