@@ -23,12 +23,13 @@ from ..microgeometry import AbstractModification
 from ..numerics import program
 from ..shafts import AbstractSupport, Misalignment, RigidSupport, ShaftSupport
 from . import gearbox
-from .errors import DesignFileError, join, naming, printable, refused
+from .errors import DesignFileError, calling, join, naming, printable, refused
 from .flanks import check_files
 from .gears import (
     AnyGear,
     GearSection,
     PairSection,
+    PlanetSection,
     RingSection,
     both_classes,
     check_pitches,
@@ -75,6 +76,8 @@ class FileSection(FileTable):
         pinion: the driving gear.
         wheel: the driven gear.
         ring: a driven ring gear in place of the wheel; the pinion is then a planet.
+        sun: the sun of a planetary stage, with [stage] and in place of the pinion.
+        planet: the planets of a planetary stage, with [stage] and in place of the wheel.
         load: torque and speed.
         title: free text; the name of the file without it.
         materials: materials of gears and shafts, by name; "STEEL" is built in.
@@ -91,6 +94,8 @@ class FileSection(FileTable):
     pinion: GearSection = entry(nested(GearSection), ...)
     wheel: GearSection | None = entry(nested(GearSection))
     ring: RingSection | None = entry(nested(RingSection))
+    sun: GearSection | None = entry(nested(GearSection))
+    planet: GearSection | None = entry(nested(PlanetSection))
     load: LoadSection = entry(nested(LoadSection), ...)
     title: str | None = entry(text())
     materials: dict[str, Template] | None = entry(table(nested(Material)))
@@ -415,10 +420,27 @@ def load_design(path: str | Path) -> DesignFile:
     """
     file = Path(path)
     with naming(file):
-        design, sections = _read(file, read(file))
-        for each in sections:
-            each.check(design)
+        content = given = read(file)
+        further = {name: cls for name, cls in further_tables().items() if name not in FileSection.keys}
+        used = [cls for name, cls in further.items() if name in content]
+        with calling({own: name for cls in used for own, name in cls.called.items()}):
+            for cls in used:
+                content = dict(cls.pair_content(content))
+            design, sections = _read(file, content, further)
+            for each in sections:
+                design = each.extended(design, given)
+            for each in sections:
+                each.check(design)
     return design
+
+
+def design_of(path: Path, content: dict[str, Any]) -> DesignFile:
+    """Design file of a pair with a content in place of that of its file, without further tables.
+
+    Raises:
+        DesignFileError: for anything that is wrong with it.
+    """
+    return _read(path, content, {})[0]
 
 
 def _only(names: set[str], of: Mapping[str, T]) -> dict[str, T]:
@@ -435,8 +457,9 @@ def _check_coast(content: Mapping[str, Any], further: Mapping[str, type[FurtherT
             raise DesignFileError("load.torque", problem)
 
 
-def _read(file: Path, content: dict[str, Any]) -> tuple[DesignFile, list[FurtherTable]]:
-    further = {name: cls for name, cls in further_tables().items() if name not in FileSection.keys}
+def _read(
+    file: Path, content: dict[str, Any], further: Mapping[str, type[FurtherTable]]
+) -> tuple[DesignFile, list[FurtherTable]]:
     top = decode("", content, file_section(further))
     folder, load = file.parent, top.load
     if load.torque_range is not None:
@@ -445,6 +468,7 @@ def _read(file: Path, content: dict[str, Any]) -> tuple[DesignFile, list[Further
     if not isinstance(load.torque, Free) and load.torque < 0:
         _check_coast(content, further, load.torque)
         load, coast = load.changed(torque=-load.torque), True
+    top.refuse(["sun", "planet"], " without [stage]")
     materials = materials_of(top.materials)
     gears = {"pinion": top.pinion, "wheel": top.driven}
     check_pitches(*gears.values())

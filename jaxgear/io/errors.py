@@ -3,7 +3,7 @@
 import difflib
 import re
 import stat
-from collections.abc import Callable, Collection, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TypeVar
@@ -41,6 +41,20 @@ def naming(file: object) -> Iterator[None]:
         yield
     except DesignFileError as error:
         raise DesignFileError(error.key, error.problem, error.file or file) from None
+
+
+@contextmanager
+def calling(names: Mapping[str, str]) -> Iterator[None]:
+    """Give tables other names in the key of every `DesignFileError` of a block.
+
+    Args:
+        names: other names by the names of the tables.
+    """
+    try:
+        yield
+    except DesignFileError as error:
+        table, rest = re.match(r"(\w*)(.*)", error.key, re.DOTALL).groups()  # type: ignore[union-attr]
+        raise DesignFileError(names.get(table, table) + rest, error.problem, error.file) from None
 
 
 @contextmanager

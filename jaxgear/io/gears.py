@@ -94,6 +94,19 @@ class RingSection(_FlankKeys, _RingKeys):  # type: ignore[misc, valid-type]
     source = RingGear
 
 
+class PlanetSection(GearSection):
+    """The planets of a stage, and the modifications of their flanks.
+
+    Attributes:
+        modification: modifications of both flanks of every tooth, or of those that carry with the sun alone where the
+            others have their own.
+        ring_modification: modifications of the flanks that carry with the ring; an empty list for involutes, those of
+            `modification` without it.
+    """
+
+    ring_modification: list[Template | FlankFileSection] | None = entry(_MODIFICATIONS)
+
+
 AnyGear = GearSection | RingSection
 
 

@@ -61,12 +61,14 @@ class FurtherTable(FileTable):
         classified: True if its `quality_class` is that of the gears where these have one, and required elsewhere.
         direction: sense of rotation of the first shaft, where the table has such a key.
         shown: names of the quantities of the table that every analysis of a design gives.
+        called: what a file with the table calls tables of the pair, by the names that these have without it.
     """
 
     drive_only: ClassVar[bool] = False
     classified: ClassVar[bool] = False
     direction: str | None = None
     shown: ClassVar[tuple[str, ...]] = ()
+    called: ClassVar[Mapping[str, str]] = {}
 
     @classmethod
     def read(cls, given: Mapping[str, Any], folder: Path) -> Self:
@@ -80,6 +82,20 @@ class FurtherTable(FileTable):
             DesignFileError: for anything that is wrong with it, in one line that names the key.
         """
         return decode(cls.table, given, cls)
+
+    @classmethod
+    def pair_content(cls, content: Mapping[str, Any]) -> Mapping[str, Any]:
+        """Content of a file with the table as that of a file of a pair; by default the same."""
+        return content
+
+    def extended(self, design: Any, content: Mapping[str, Any]) -> Any:
+        """The `DesignFile` of the pair with what the table adds; by default the same.
+
+        Args:
+            design: the `DesignFile` of `pair_content`.
+            content: content of the file.
+        """
+        return design
 
     @property
     def value(self) -> object:

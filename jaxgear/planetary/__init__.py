@@ -11,6 +11,7 @@ meshes.max_flank_pressure, meshes.root_stress.planet_to_ring
 """
 
 from .cycle import StageCycle as StageCycle
+from .flanks import StageFlanks as StageFlanks
 from .gears import StageGears as StageGears
 from .kinematics import Members as Members
 from .kinematics import Phasing as Phasing
@@ -37,6 +38,8 @@ from .meshes import StageFlanks as StageFlanks
 from .meshes import TableMesh as TableMesh
 from .response import StageResponse as StageResponse
 from .response import stage_response as stage_response
+from .quantities import STAGE_QUANTITIES as STAGE_QUANTITIES
+from .quantities import StageSettings as StageSettings
 from .solve import PreparedStage as PreparedStage
 from .solve import prepare_stage as prepare_stage
 from .solve import solve_stage as solve_stage

@@ -14,6 +14,7 @@ from .kinematics import phasing, planet_phases
 from .stage import PlanetaryStage
 
 _SIZE = 95.0  # of the drawing of a stage [mm]
+_LEAST_SHARE = 0.05  # on either side of 1: what is less is nothing
 _MOTIONS = {"rotation": "R", "translation": "T", "none": "\N{EN DASH}"}
 
 
@@ -80,6 +81,8 @@ def load_shares(cycle: StageCycle, ax: Axes | None = None) -> Axes:
             label = f"planet {number + 1} ({means[number]:.3f})"
             ax.plot(*two_pitches(cycle.phase, share), label=label, **line_style(number))
         ax.axhline(1.0, color=GREY, linewidth=0.6, zorder=0.5)
+        widest = max(_LEAST_SHARE, 1.1 * float(np.abs(np.asarray(cycle.load_share) - 1).max()))
+        ax.set_ylim(1 - widest, 1 + widest)
         ax.set(xlim=(0, 2), xlabel=PHASE_LABEL, ylabel="load share of the planet [-]")
         legend_above(ax)
     return ax
@@ -144,9 +147,14 @@ def orbit(cycles: Mapping[str, StageCycle], ax: Axes | None = None) -> Axes:
             path = np.asarray(cycle.sun_displacement)
             x, y = path.mean(axis=1)
             about = np.concatenate([path, path[:, :1]], axis=1) - [[x], [y]]
-            ax.plot(*about, label=f"{name} (about {x:.1f}, {y:.1f} µm)", **line_style(index))
+            ax.plot(*about, label=f"{name} (about {_rounded(x)}, {_rounded(y)} µm)", **line_style(index))
         ax.plot(0, 0, marker="+", color=GREY, markersize=7)
         ax.set(xlabel="x of the sun [µm]", ylabel="y of the sun [µm]")
         ax.set_aspect("equal", adjustable="datalim")
         legend_above(ax)
     return ax
+
+
+def _rounded(value: float) -> str:
+    """A number with one digit, never -0.0."""
+    return f"{round(value, 1) + 0.0:.1f}"

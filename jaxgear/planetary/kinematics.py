@@ -47,8 +47,8 @@ def member_torques(stage: PlanetaryStage, torque: Given) -> Members:
         stage: the stage.
         torque: size of the torque on the driving member [N m].
     """
+    sun = real(torque) / driving_torque(stage, 1.0)
     ratio = stage.gears.ring_teeth / stage.gears.sun_teeth
-    sun = real(torque) / {"sun": jnp.ones_like(ratio), "ring": ratio, "carrier": 1 + ratio}[stage.driving]
     return Members(sun, sun * ratio, -sun * (1 + ratio), jnp.zeros_like(sun))
 
 
@@ -60,6 +60,12 @@ def mesh_force(stage: PlanetaryStage, torque: Given) -> Scalar:
         torque: size of the torque on the driving member [N m].
     """
     return 1e3 * member_torques(stage, torque).sun / stage.gears.base_radius(stage.gears.sun_teeth)
+
+
+def driving_torque(stage: PlanetaryStage, torque: Given) -> Scalar:
+    """Size of the torque on the driving member [N m] that belongs to one on the sun."""
+    ratio = stage.gears.ring_teeth / stage.gears.sun_teeth
+    return real(torque) * {"sun": jnp.ones_like(ratio), "ring": ratio, "carrier": 1 + ratio}[stage.driving]
 
 
 def member_speeds(stage: PlanetaryStage, speed: Given) -> Members:

@@ -1,0 +1,55 @@
+"""Modifications of the flanks of a stage as one design of its mesh of sun and planet."""
+
+from typing import NamedTuple, Self
+
+from jaxtyping import Array, Float
+
+from ..microgeometry import AbstractModification
+from ..microgeometry.base import Flank
+
+
+class StageFlanks(AbstractModification):
+    """Modification of a planet towards the sun, together with those of the mesh of planet and ring.
+
+    In the place of the wheel's modification it makes a design of a pair of sun and planet one of the whole stage:
+    `lambda v: (sun, StageFlanks(to_sun, to_ring, ring))`. In that mesh it acts as `to_sun`.
+
+    Attributes:
+        to_sun: modification of the flanks of the planets that carry with the sun; None for the nominal involute.
+        to_ring: of those that carry with the ring; None for the nominal involute.
+        ring: of the flanks of the ring; None for the nominal involute.
+    """
+
+    to_sun: AbstractModification | None = None
+    to_ring: AbstractModification | None = None
+    ring: AbstractModification | None = None
+
+    def __call__(self, flank: Flank) -> Float[Array, "..."]:
+        return 0.0 * flank.roll_length if self.to_sun is None else self.to_sun(flank)
+
+    @property
+    def varies_along_face(self) -> bool:
+        return self.to_sun is not None and self.to_sun.varies_along_face
+
+
+class FourFlanks(NamedTuple):
+    """Modifications of a stage, as `solve_stage` takes them; None for nominal involutes.
+
+    Attributes:
+        sun, planet_to_sun, planet_to_ring, ring: as of `solve_stage`.
+    """
+
+    sun: AbstractModification | None
+    planet_to_sun: AbstractModification | None
+    planet_to_ring: AbstractModification | None
+    ring: AbstractModification | None
+
+    @classmethod
+    def of(cls, sun: AbstractModification | None, planet: AbstractModification | None) -> Self:
+        """The modifications of a design of the pair of sun and planet.
+
+        One that is no `StageFlanks` belongs to both flanks of the planets, and the ring has none.
+        """
+        if isinstance(planet, StageFlanks):
+            return cls(sun, planet.to_sun, planet.to_ring, planet.ring)
+        return cls(sun, planet, planet, None)

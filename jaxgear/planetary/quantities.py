@@ -1,0 +1,168 @@
+"""Quantities of a whole planetary stage: objectives, limits, columns of sweeps.
+
+They are those of a design of the mesh of sun and planet, in the place of whose wheel stand `StageFlanks`, and need the
+stage besides: `StageSettings.quantity` supplies it in Python, the table [stage] in a design file.
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+from typing import Any, ClassVar
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from ..metrics import AbstractSettings, Analysis, Quantity, Vocabulary, peak_to_peak
+from ..numerics import Quantile, maximum, number
+from .cycle import StageCycle
+from .flanks import FourFlanks
+from .kinematics import driving_torque
+from .solve import PreparedStage, solve_stage
+
+Scalar = Float[Array, ""]
+
+_LEVEL = 0.95  # of the stages with errors that are no worse than a quantity with errors says
+
+
+class StageSettings(AbstractSettings):
+    """The stage of which a mesh of sun and planet is one.
+
+    settings = StageSettings(prepare_stage(stage, sun=sun_mesh, ring=ring_mesh))
+    jaxgear.minimize(sun_mesh, torque / 3, lambda v: (sun(v), StageFlanks(to_sun(v), to_ring(v), ring(v))), bounds,
+        objective=settings.quantity("stage_ppte"))
+
+    The torque of such a design is that of one mesh, on the sun: the torque of the sun over the number of planets. The
+    stage is solved at the positions that it was prepared at, whatever those of the mesh.
+
+    Attributes:
+        prepared: prepared stage.
+        pin_errors: tangential displacements of the pins of many stages, in addition to those of the stage, shape
+            (samples, planets); None for the stage alone.
+    """
+
+    table: ClassVar[str] = "stage"
+
+    prepared: PreparedStage
+    pin_errors: Float[Array, "samples planets"] | None = number(
+        "um", shape=("samples", "planets"), optional=True, default=None
+    )
+
+    def check_together(self) -> None:
+        planets = self.prepared.stage.planets
+        if self.pin_errors is not None and self.pin_errors.shape[1] != planets:
+            raise ValueError(
+                f"StageSettings: pin_errors has {self.pin_errors.shape[1]} columns, must have one for each of the "
+                f"{planets} planets"
+            )
+
+    def solve(self, analysis: Analysis) -> StageCycle:
+        """The stage with the flanks and at the torque of an analysis."""
+        return analysis.once(self, "stage", lambda: _solved(self.prepared, analysis))
+
+    def solve_with_errors(self, analysis: Analysis) -> StageCycle:
+        """The stages with pin errors, with an axis (samples,) in front.
+
+        Raises:
+            ValueError: without `pin_errors`.
+        """
+        errors = self.pin_errors
+        if errors is None:
+            raise ValueError("needs pin_errors of the StageSettings")
+
+        def of(errors: Array) -> StageCycle:
+            stage = self.prepared.stage
+            own = stage.tangential_pin_error
+            with_errors = replace(stage, tangential_pin_error=errors if own is None else own + errors)
+            return _solved(replace(self.prepared, stage=with_errors), analysis)
+
+        return analysis.once(self, "stages with errors", lambda: jax.vmap(of)(errors))
+
+
+def _solved(prepared: PreparedStage, analysis: Analysis) -> StageCycle:
+    stage, cycle = prepared.stage, analysis.cycle
+    torque = driving_torque(stage, stage.planets * cycle.torque)
+    flanks = FourFlanks.of(cycle.pinion, cycle.wheel)
+    return solve_stage(prepared, torque, **flanks._asdict())
+
+
+def _number(of: Callable[[StageCycle], Scalar], analysis: Analysis, settings: StageSettings) -> Scalar:
+    cycle = settings.solve(analysis)
+    return jnp.where(jnp.all(cycle.converged), of(cycle), jnp.nan)
+
+
+def _with_errors(of: Callable[[StageCycle], Scalar], analysis: Analysis, settings: StageSettings) -> Scalar:
+    cycles = settings.solve_with_errors(analysis)
+    values = jax.vmap(of)(cycles)
+    alike = jnp.ones_like(values) / len(values)
+    fine = jnp.all(cycles.converged)
+    return jnp.where(fine, Quantile(_LEVEL)(values, alike), jnp.nan)
+
+
+def _order(number: int, cycle: StageCycle) -> Scalar:
+    return cycle.orders(number).amplitude[number - 1]
+
+
+_ORDERS = 3
+
+# of a stage: its function, unit, meaning
+OF_STAGE: dict[str, tuple[Callable[[StageCycle], Scalar], str, str]] = {
+    "stage_ppte": (
+        lambda cycle: peak_to_peak(cycle.transmission_error),
+        "um",
+        "transmission error of the stage on the base circle of the sun, peak to peak",
+    ),
+    "mean_stage_transmission_error": (
+        lambda cycle: jnp.mean(cycle.transmission_error),
+        "um",
+        "transmission error of the stage on the base circle of the sun, mean",
+    ),
+    **{
+        f"stage_mesh_order_{order}": (
+            partial(_order, order),
+            "um",
+            f"transmission error of the stage at {order} times the mesh frequency, amplitude",
+        )
+        for order in range(1, _ORDERS + 1)
+    },
+    "load_sharing_factor": (
+        lambda cycle: cycle.load_sharing_factor,
+        "",
+        "load sharing factor K_gamma: largest mean load of a planet over the mean of all",
+    ),
+    "peak_load_sharing_factor": (
+        lambda cycle: cycle.peak_load_sharing_factor,
+        "",
+        "largest load of a planet at any position over the mean of all",
+    ),
+    "sun_orbit": (lambda cycle: cycle.orbit, "um", "largest distance of the sun's centre from its mean place"),
+    "max_pin_force": (lambda cycle: maximum(cycle.pin_force), "N", "largest force of a planet on its pin"),
+    "pin_force_excitation": (
+        lambda cycle: maximum(jax.vmap(peak_to_peak)(cycle.pin_force)),
+        "N",
+        "force of a planet on its pin, largest peak to peak",
+    ),
+}
+WITH_ERRORS = "_with_pin_errors"
+_ROBUST = "stage_ppte", "load_sharing_factor", "peak_load_sharing_factor", "max_pin_force"
+_FORMS = {"N": ".0f"}
+
+
+def _quantity(name: str, of: Callable[..., Any], unit: str, meaning: str) -> Quantity:
+    return Quantity(name, of, unit, meaning, takes=StageSettings, form=_FORMS.get(unit, ".4g"))
+
+
+STAGE_QUANTITIES = Vocabulary(
+    (
+        *(_quantity(name, partial(_number, of), unit, meaning) for name, (of, unit, meaning) in OF_STAGE.items()),
+        *(
+            _quantity(
+                f"{name}{WITH_ERRORS}",
+                partial(_with_errors, OF_STAGE[name][0]),
+                OF_STAGE[name][1],
+                f"{OF_STAGE[name][2]}; 95 % quantile over stages with pin errors",
+            )
+            for name in _ROBUST
+        ),
+    )
+)

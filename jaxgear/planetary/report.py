@@ -1,0 +1,189 @@
+"""A solved stage in tables, chapters and figures."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from ..metrics import peak_to_peak
+from ..numerics import program
+from ..report import Chapter, Figure, Part, Record, Table, numbers_of, table_of
+from .cycle import StageCycle
+from .flanks import FourFlanks
+from .kinematics import (
+    gear_ratio,
+    member_speeds,
+    member_torques,
+    mesh_frequency,
+    output_member,
+    phasing,
+    planet_phases,
+)
+from .solve import PreparedStage, solve_stage
+from .stage import PlanetaryStage
+
+_ORDERS = 6
+_MEMBERS = "sun", "ring", "carrier"
+
+# of a cycle
+_NUMBERS: tuple[Record[StageCycle], ...] = (
+    Record("stage_ppte", "um", lambda cycle: peak_to_peak(cycle.transmission_error), "PPTE of the stage [µm]"),
+    Record(
+        "mean_stage_transmission_error",
+        "um",
+        lambda cycle: jnp.mean(cycle.transmission_error),
+        "mean transmission error of the stage [µm]",
+    ),
+    Record("load_sharing_factor", "", lambda cycle: cycle.load_sharing_factor, "load sharing factor K_gamma"),
+    Record("peak_load_sharing_factor", "", lambda cycle: cycle.peak_load_sharing_factor, "largest load share"),
+    Record("sun_orbit", "um", lambda cycle: cycle.orbit, "orbit of the sun [µm]"),
+    Record("max_pin_force", "N", lambda cycle: jnp.max(cycle.pin_force), "largest force on a pin [N]", ".0f"),
+)
+
+
+@program
+def stages_over_torques(
+    prepared: PreparedStage, torques: Float[Array, " torques"], flanks: FourFlanks
+) -> tuple[StageCycle, StageCycle]:
+    """The stage under several torques on the driving member [N m], without and with modifications of its flanks."""
+
+    def of(share: Array, torque: Array) -> StageCycle:
+        scaled = (None if each is None else share * each for each in flanks)
+        return solve_stage(prepared, torque, **FourFlanks(*scaled)._asdict())
+
+    shares = jnp.asarray([0.0, 1.0], torques.dtype)
+    both = jax.vmap(jax.vmap(of, (None, 0)), (0, None))(shares, torques)
+    return jax.tree.map(lambda leaf: leaf[0], both), jax.tree.map(lambda leaf: leaf[1], both)
+
+
+def part(over_torques: Mapping[str, StageCycle], speed: float | None) -> Part:
+    """The stage under load with the flanks of several designs, for the terminal, the report and the files.
+
+    Args:
+        over_torques: cycles of one stage under several torques by the name of their design, with an axis (torques,) in
+            front: under the design torque, then over a range. The last one is the design of the report.
+        speed: speed of the driving member [rpm]; None for none.
+    """
+    cycles = {name: jax.tree.map(lambda leaf: leaf[0], each) for name, each in over_torques.items()}
+    name, cycle = list(cycles.items())[-1]
+    numbers = table_of(_NUMBERS, cycles, "Planetary stage", "stage", across=True, note=_note(cycle))
+    return Part(
+        tables=(numbers, _over_torques(over_torques)),
+        chapters=tuple(_chapters(name, cycles, speed)),
+        data={name: {**numbers_of(_NUMBERS, each), **_lists(each)} for name, each in cycles.items()},
+        lines=tuple(_lines(cycles)),
+        figures=tuple(partial(_drawn, name, cycles) for name in _FIGURES),
+    )
+
+
+def _over_torques(cycles: Mapping[str, StageCycle]) -> Table:
+    """Transmission error over the range of torques."""
+    first = next(iter(cycles.values()))
+    header = ("torque [N m]", *(f"{name} [µm]" for name in cycles))
+    table = Table(header, (), f"PPTE of the stage over the torque on the {first.stage.driving}")
+    errors = [np.ptp(np.asarray(cycle.transmission_error), axis=-1)[1:] for cycle in cycles.values()]
+    for torque, *row in zip(np.asarray(first.torque)[1:], *errors):
+        table.add_row(f"{torque:.4g}", *(f"{value:.3f}" for value in row))
+    return table
+
+
+def _note(cycle: StageCycle) -> str:
+    return f"{float(member_torques(cycle.stage, cycle.torque).sun):g} N m on the sun, base circle of the sun"
+
+
+def _lists(cycle: StageCycle) -> dict[str, Any]:
+    """Numbers of planets and orders as plain data."""
+    return {
+        "mean_load_share": np.asarray(cycle.mean_load_share).tolist(),
+        "mesh_orders_um": np.asarray(cycle.orders(_ORDERS).amplitude).tolist(),
+        "converged": bool(np.all(cycle.converged)),
+    }
+
+
+def _lines(cycles: Mapping[str, StageCycle]) -> Iterator[tuple[str, ...]]:
+    """Rows of `stage.csv`: transmission error and mesh forces of every design over the positions."""
+    planets = next(iter(cycles.values())).stage.planets
+    forces = [f"{member}_force_{planet + 1}_N" for member in ("sun", "ring") for planet in range(planets)]
+    yield ("design", "phase", "transmission_error_um", *forces)
+    for name, cycle in cycles.items():
+        curves = [cycle.phase, cycle.transmission_error, *cycle.sun_force, *cycle.ring_force]
+        for row in np.stack([np.asarray(each) for each in curves], axis=1):
+            yield (name, *(f"{value:.7g}" for value in row))
+
+
+def _chapters(name: str, cycles: Mapping[str, StageCycle], speed: float | None) -> Iterator[Chapter]:
+    cycle = cycles[name]
+    tables = [_members(cycle.stage, cycle.torque, speed), _planets(cycle), _orders(cycles)]
+    yield Chapter("Planetary stage", _texts(cycle.stage, speed), tables=tables, new_page=True)
+
+
+def _texts(stage: PlanetaryStage, speed: float | None) -> Iterator[str]:
+    output = output_member(stage)
+    yield (
+        f"{stage.planets} planets, the {stage.fixed} is fixed, the {stage.driving} drives the {output}, ratio "
+        f"{float(gear_ratio(stage)):.5g}. The transmission error is that of the sun on its base circle, with ring and "
+        "carrier held."
+    )
+    if speed is not None:
+        yield f"Mesh frequency {float(mesh_frequency(stage, speed)):.5g} Hz."
+    yield (
+        "Forces act along the lines of action, without friction. All planets and their teeth are alike but for the "
+        "errors of [stage]."
+    )
+
+
+def _members(stage: PlanetaryStage, torque: Any, speed: float | None) -> Table:
+    torques = member_torques(stage, torque)
+    speeds = None if speed is None else member_speeds(stage, speed)
+    supports = {"sun": stage.sun_support, "ring": stage.ring_support, "carrier": stage.carrier_support}
+    table = Table(("member", "torque [N m]", *["speed [rpm]"] * (speed is not None), "support [N/µm]"), (), "Members")
+    for member in _MEMBERS:
+        support = supports[member]
+        held = "rigid" if support is None else f"{float(support):g}" if float(support) else "floats"
+        turns = [] if speeds is None else [f"{float(getattr(speeds, member)):.5g}"]
+        table.add_row(member, f"{float(getattr(torques, member)):.5g}", *turns, held)
+    if speeds is not None:
+        table.add_row("planets", "0", f"{float(speeds.planet):.5g}", "pins")
+    return table
+
+
+def _planets(cycle: StageCycle) -> Table:
+    stage = cycle.stage
+    places = np.rad2deg(np.asarray(stage.planet_angles))
+    sun, ring = (np.asarray(each) for each in planet_phases(stage))
+    header = ("planet", "place [deg]", "phase, sun", "phase, ring", "load share", "force on the pin [N]")
+    table = Table(header, (), "Planets", "phases in base pitches; shares and forces are means of the cycle")
+    shares, forces = np.asarray(cycle.mean_load_share), np.asarray(cycle.pin_force).mean(axis=-1)
+    for number, row in enumerate(zip(places, sun, ring, shares, forces)):
+        table.add_row(str(number + 1), *(f"{value:{form}}" for value, form in zip(row, _PLANET_FORMS)))
+    return table
+
+
+_PLANET_FORMS = ".3f", ".4f", ".4f", ".4f", ".0f"
+
+
+def _orders(cycles: Mapping[str, StageCycle]) -> Table:
+    note = "what equal planets excite by their phases: rotation (R), translation (T) or neither"
+    table = Table(("mesh order", "excites", *(f"{name} [µm]" for name in cycles)), (), "Transmission error", note)
+    kinds = phasing(next(iter(cycles.values())).stage, _ORDERS).kinds
+    amplitudes = [np.asarray(cycle.orders(_ORDERS).amplitude) for cycle in cycles.values()]
+    for order, (kind, *row) in enumerate(zip(kinds, *amplitudes)):
+        table.add_row(str(order + 1), kind, *(f"{value:.3f}" for value in row))
+    return table
+
+
+_FIGURES = "stage_drawing", "transmission_error", "load_shares", "orders", "orbit"
+
+
+def _drawn(name: str, cycles: Mapping[str, StageCycle]) -> Figure:
+    from . import figures  # imports matplotlib
+
+    last = list(cycles.values())[-1]
+    of = {"stage_drawing": last.stage, "load_shares": last}.get(name, cycles)
+    found = Figure.of(getattr(figures, name), of)
+    return replace(found, name=name if name.startswith("stage") else f"stage_{name}")

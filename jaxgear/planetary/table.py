@@ -1,0 +1,213 @@
+"""The table [stage] of a design file: a planetary stage, whose sun, planets and ring stand in tables of their own."""
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import jax
+import numpy as np
+from jaxtyping import Array, Float
+
+from ..contact import MeshCycle
+from ..io.design_file import DesignFile, FileDesign, design_of
+from ..io.errors import DesignFileError, calling, join, refused
+from ..io.table_keys import entry, section_of, template_of
+from ..io.tables import FurtherTable
+from ..io.value_types import SEED, count, positive
+from ..metrics import Quantity
+from ..microgeometry import AbstractModification, NoModification
+from ..numerics import real
+from ..report import Part
+from ..tolerance import TruncatedNormal
+from .flanks import FourFlanks, StageFlanks
+from .gears import StageGears
+from .kinematics import driving_torque, mesh_frequency
+from .quantities import WITH_ERRORS, StageSettings
+from .report import part, stages_over_torques
+from .solve import prepare_stage
+from .stage import PlanetaryStage
+
+_GEARS = "sun", "planet", "ring"
+_FLANKS = "modification", "ring_modification"
+_SAMPLES, _MOST_SAMPLES = 32, 4096
+_TORQUES = 9  # over the range of the file
+_FEWEST_POSITIONS = 16  # a multiple of it and of the number of planets
+# tables that the mesh of planet and ring has in common with that of sun and planet
+_SHARED = "title", "materials", "model", "resolution"
+_LEFT_OUT = "tolerance", "misalignment", "shafts", "teeth", "layout", "wear", "dynamics", "rating"
+
+
+class _StageDesign(FileDesign):
+    """The flanks of a stage as a function of the free parameters of its file; pure and traceable.
+
+    Attributes:
+        outer: flanks of planet and ring.
+    """
+
+    outer: FileDesign
+
+    def __call__(self, parameters: Mapping[str, Any]) -> tuple[AbstractModification, AbstractModification]:
+        """Modifications of the sun, and of planets and ring as `StageFlanks`."""
+        sun, to_sun = super().__call__(parameters)
+        to_ring, ring = self.outer({name: parameters[name] for name in self.outer.names})
+        if all(isinstance(each, NoModification) for each in (to_sun, to_ring, ring)):
+            return sun, to_sun
+        return sun, StageFlanks(to_sun, to_ring, ring)
+
+
+class StageSection(FurtherTable, section_of(PlanetaryStage, ("gears",), open=False)):  # type: ignore[misc]
+    """A planetary stage.
+
+    A file with the table has [sun], [planet] and [ring] in place of pinion and wheel, and its load is that of the
+    driving member. Commands analyze the mesh of sun and planet under the share of a planet, and the whole stage with
+    it; variables are those of the flanks.
+
+    Attributes:
+        pin_tolerance: limit of the tangential displacement of every pin of either sign, three standard deviations, for
+            quantities with pin errors.
+        pin_samples: number of stages with such errors.
+        seed: seed of the errors.
+    """
+
+    table = "stage"
+    drive_only = True
+    called = {"pinion": "sun", "wheel": "planet"}
+
+    pin_tolerance: float | None = entry(positive("um"))
+    pin_samples: int = entry(count(2, _MOST_SAMPLES), _SAMPLES)
+    seed: int = entry(SEED, 0)
+    _outer: DesignFile
+    _torque: float  # on the driving member, as are range and speed
+    _torques: tuple[float, float]
+    _speed: float | None
+    _made: tuple[DesignFile, StageSettings] | None = None
+
+    @classmethod
+    def pair_content(cls, content: Mapping[str, Any]) -> Mapping[str, Any]:
+        """Content of a file of sun and planet."""
+        for name in _GEARS:
+            if name not in content:
+                raise DesignFileError(name, "missing, this table is required with [stage]")
+        for name in cls.called:
+            if name in content:
+                raise DesignFileError(cls.table, f"has no effect with [{name}]: give [sun], [planet] and [ring]")
+        for name in _LEFT_OUT:
+            if name in content:
+                raise DesignFileError(cls.table, f"has no effect with [{name}], which knows a single pair")
+        pair = {name: table for name, table in content.items() if name not in _GEARS}
+        planet = content["planet"]
+        if isinstance(planet, dict):
+            planet = {key: value for key, value in planet.items() if key != "ring_modification"}
+        pair |= {"pinion": content["sun"], "wheel": planet}
+        only_there = _names(cls._ring_content(content)) - _names(pair)
+        if isinstance(pair.get("variables"), dict):
+            pair["variables"] = {name: each for name, each in pair["variables"].items() if name not in only_there}
+        return pair
+
+    @staticmethod
+    def _ring_content(content: Mapping[str, Any]) -> dict[str, Any]:
+        """Content of a file of planet and ring, but for load and centre distance."""
+        pair = {name: content[name] for name in _SHARED if name in content}
+        planet = content["planet"]
+        if isinstance(planet, dict):
+            given = [planet[name] for name in _FLANKS if name in planet]
+            planet = {key: value for key, value in planet.items() if key not in _FLANKS}
+            planet |= {"modification": given[-1]} if given else {}
+        pair |= {"pinion": planet, "ring": content["ring"]}
+        variables = content.get("variables")
+        if isinstance(variables, dict):
+            used = _names(pair)
+            pair["variables"] = {name: each for name, each in variables.items() if name in used}
+        return pair
+
+    def extended(self, design: DesignFile, content: Mapping[str, Any]) -> DesignFile:
+        """Design file of sun and planet under the load of their mesh, with all flanks of the stage."""
+        for free in design.open_case:
+            raise DesignFileError(free.key, f'"{free.name}" must be a number: variables of a stage are of its flanks')
+        for name in ("backlash", "axial_offset"):
+            if name in content.get("pair", {}):
+                raise DesignFileError(f"pair.{name}", "has no effect with [stage]")
+        distance = float(design.pair().working_center_distance)
+        given = {"load": {"torque": design.torque}, "pair": {"center_distance": distance}}
+        with calling({"pinion": "planet"}):
+            outer = design_of(design.path, {**self._ring_content(content), **given})
+        planets, sun_teeth = self.planets, design.pair().pinion.teeth
+        stage = self._stage(design, outer)
+        share = float(1 / (planets * driving_torque(stage, 1.0)))
+        speed = None
+        if design.speed is not None:
+            speed = float(60 * mesh_frequency(stage, design.speed) / sun_teeth)
+        load: Any = {"torque": real(share * design.torque)} | ({} if speed is None else {"speed": real(speed)})
+        low, high = design.torque_range
+        self._outer, self._speed = outer, design.speed
+        self._torque, self._torques = design.torque, design.torque_range
+        return replace(
+            design,
+            text=json.dumps(content, sort_keys=True, default=str),
+            torque=share * design.torque,
+            torque_range=(share * low, share * high),
+            speed=speed,
+            bounds={**design.bounds, **outer.bounds},
+            units={**design.units, **outer.units},
+            values={**design.values, **outer.values},
+            design=_StageDesign(
+                tuple({**design.bounds, **outer.bounds}), design.design.pinion, design.design.wheel, outer.design
+            ),
+            _load=design._load.having(**load),
+        )
+
+    def _stage(self, design: DesignFile, outer: DesignFile) -> PlanetaryStage:
+        gears = refused(self.key, StageGears.of_pairs, design.pair(), outer.pair())
+        stage: PlanetaryStage = template_of(self, PlanetaryStage).having(gears=gears).build({})
+        return stage
+
+    def check(self, design: DesignFile) -> None:
+        """Refuses flanks that carry nothing, and pairs that differ."""
+        for name, section in (("pin_samples", self.pin_samples), ("seed", self.seed)):
+            if name in self.fields and self.pin_tolerance is None:
+                raise DesignFileError(join(self.key, name), f"{section} has no effect without stage.pin_tolerance")
+
+    def quantity(self, design: DesignFile, key: str, quantity: Quantity) -> Quantity:
+        """A quantity of the stage."""
+        if quantity.name.endswith(WITH_ERRORS) and self.pin_tolerance is None:
+            raise DesignFileError(key, f'"{quantity.name}" needs stage.pin_tolerance')
+        return quantity.with_settings(self.settings(design))
+
+    def settings(self, design: DesignFile) -> StageSettings:
+        """The stage with prepared meshes, and pin errors where the file has a tolerance."""
+        if self._made is not None and self._made[0] is design:
+            return self._made[1]
+        stage = self._stage(design, self._outer)
+        step = math.lcm(_FEWEST_POSITIONS, stage.planets)
+        meshes = {}
+        for name, each in (("sun", design), ("ring", self._outer)):
+            sizes = each.resolution()
+            meshes[name] = each.mesh(replace(sizes, positions=step * -(-sizes.positions // step)))
+        made = StageSettings(prepare_stage(stage, **meshes), self._pin_errors(stage.planets))
+        self._made = design, made
+        return made
+
+    def _pin_errors(self, planets: int) -> Float[Array, "samples planets"] | None:
+        if self.pin_tolerance is None:
+            return None
+        key, shape = jax.random.key(self.seed), (self.pin_samples, planets)
+        return self.pin_tolerance * TruncatedNormal()(key, shape, real(0.0).dtype)
+
+    def part(self, design: DesignFile, name: str, cycle: MeshCycle) -> Part:
+        """The stage with the flanks of a design, for the terminal, the report and the files."""
+        settings, (low, high) = self.settings(design), self._torques
+        torques = np.concatenate([[self._torque], np.linspace(low, high, _TORQUES)])
+        flanks = FourFlanks.of(cycle.pinion, cycle.wheel)
+        unmodified, modified = stages_over_torques(settings.prepared, torques, flanks)
+        return part({"unmodified": unmodified, name: modified}, speed=self._speed)
+
+
+def _names(content: object) -> set[str]:
+    """All texts of a content but those of its variables: the names of those that it uses are among them."""
+    if isinstance(content, str):
+        return {content}
+    if isinstance(content, Mapping):
+        return set().union(*(_names(each) for name, each in content.items() if name != "variables"))
+    return set().union(*map(_names, content)) if isinstance(content, list) else set()
