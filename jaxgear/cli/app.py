@@ -99,6 +99,12 @@ def new(
     profile_shift: Annotated[
         tuple[float, float], typer.Option(metavar="X1 X2", help="Profile shifts of pinion and wheel in modules.")
     ] = (0.0, 0.0),
+    planetary: Annotated[
+        int | None,
+        typer.Option(
+            metavar="N", help="A planetary stage with N planets; the teeth are those of sun and planets.", min=2
+        ),
+    ] = None,
 ) -> int:
     """Write a commented design file for a pair, ready for `analyze` and `optimize`.
 
@@ -107,7 +113,7 @@ def new(
     given = locals()
     with interrupt.importing():
         from .new import new
-    new(given.pop("file"), **given)
+    new(given.pop("file"), planets=given.pop("planetary"), **given)
     return OK
 
 

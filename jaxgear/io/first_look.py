@@ -16,7 +16,7 @@ from .toml import read
 from .trade_words import unknown_key
 
 MODIFICATION, MATERIAL, VARIABLE = "modification of type {}", "material", "variable"
-GEARS = "pinion", "wheel"
+GEARS = "pinion", "wheel", "sun"
 METHODS = "optimize.method"
 KEYS = Path(__file__).with_name("keys.json")
 
@@ -55,7 +55,7 @@ def _tables(says: Mapping[str, Any]) -> Iterator[tuple[str, Mapping[str, Any], s
             yield name, table, name
         else:
             yield from ((join(name, own), each, several) for own, each in table.items() if isinstance(each, dict))
-        given = table.get("modification") if name in GEARS else None
+        given = table.get("modification") if name in (*GEARS, "ring", "planet") else None
         for number, each in enumerate(given if isinstance(given, list) else []):
             if isinstance(each, dict):
                 own = {key: value for key, value in each.items() if key != "type"}

@@ -20,7 +20,7 @@ from ..vocabulary import quantities
 from . import first_look, gearbox, imperial
 from .design_file import file_section
 from .flanks import FlankFileSection
-from .gears import GearSection, PairSection
+from .gears import GearSection, PairSection, PlanetSection, RingSection
 from .model_table import ModelSection, ResolutionSection
 from .optimize_table import known_methods
 from .table_keys import FileTable, family, meanings, section_of, snake, summary
@@ -49,6 +49,8 @@ def checked_tables() -> dict[str, type[FileTable]]:
     return {
         "": file_section(further),
         **dict.fromkeys(first_look.GEARS, GearSection),
+        "ring": RingSection,
+        "planet": PlanetSection,
         "pair": PairSection,
         "load": LoadSection,
         "model": ModelSection,
@@ -82,7 +84,9 @@ def _anchor(title: str) -> str:
 def _tables() -> Iterator[tuple[str, type[FileTable]]]:
     further = further_tables(users=False)
     yield "The top level", file_section(further)
-    yield "[pinion] and [wheel]", GearSection
+    yield "[pinion], [wheel] and [sun]", GearSection
+    yield "[ring]", RingSection
+    yield "[planet]", PlanetSection
     yield "[materials.NAME], [pinion.material] and [wheel.material]", section_of(Material)
     yield "[pair]", PairSection
     yield from _types("[[pinion.modification]]", AbstractModification)

@@ -67,14 +67,7 @@ def write_starter(
         ValueError: for gears that are not possible, a torque that is not positive, or a file that exists already or
             cannot be written.
     """
-    path = Path(path)
-    if path.suffix != ".toml":
-        raise ValueError(f"{path}: the name of a design file must end in .toml")
-    if path.exists() or path.is_symlink():
-        raise ValueError(f"{path}: exists already, choose another name")
-    check("torque", torque, "N m", low=0.0, open_low=True)
-    if speed is not None:
-        check("speed", speed, "rpm", low=0.0, open_low=True)
+    path = check_new(path, torque, speed)
     compile_quickly()
     pair = starter_pair(teeth, module, face_width, helix_angle, pressure_angle, profile_shift)
     rule = iso_relief(pair, torque)
@@ -82,8 +75,9 @@ def write_starter(
     rack = "" if pressure_angle == _PRESSURE_ANGLE else _RACK.format(angle=pressure_angle)
     rack += _FILLET.format(radius=float(pair.pinion.root_radius)) if pressure_angle < _PRESSURE_ANGLE else ""
     shifts = [_SHIFT.format(shift=shift) if shift else _NO_SHIFT for shift in profile_shift]
-    text = _STARTER.read_text(encoding="utf-8").format(
-        name=path.name,
+    write_filled(
+        path,
+        _STARTER,
         title=f"{teeth[0]}/{teeth[1]} pair, module {module:g} mm",
         pinion=teeth[0],
         wheel=teeth[1],
@@ -95,17 +89,53 @@ def write_starter(
         shift=shifts[0],
         mate_shift=shifts[1] if profile_shift[1] else "",
         hand=_HAND.format(angle=helix_angle) if helix_angle else _SPUR,
-        speed=_NO_SPEED if speed is None else _SPEED.format(speed=speed),
+        speed=speed_line(speed),
         amount=amount,
         most=max(_MOST * amount, _LEAST_MOST),
         length=length,
         shortest=min(_SHORTEST * module, 0.5 * length),
         longest=length + 0.005,  # rounding must not put the value outside
     )
+    return pair
+
+
+def check_new(path: str | Path, torque: float, speed: float | None) -> Path:
+    """Path of a design file to begin with.
+
+    Args:
+        path: path of the TOML file, which must not exist.
+        torque: torque of the file [N m].
+        speed: speed of the file [rpm]; None for none.
+
+    Raises:
+        ValueError: for a torque or speed that is not positive, another ending, or a file that exists already.
+    """
+    path = Path(path)
+    if path.suffix != ".toml":
+        raise ValueError(f"{path}: the name of a design file must end in .toml")
+    if path.exists() or path.is_symlink():
+        raise ValueError(f"{path}: exists already, choose another name")
+    check("torque", torque, "N m", low=0.0, open_low=True)
+    if speed is not None:
+        check("speed", speed, "rpm", low=0.0, open_low=True)
+    return path
+
+
+def speed_line(speed: float | None, of: str = "the pinion") -> str:
+    """Line of a design file with a speed [rpm], or a comment in its place."""
+    return (_NO_SPEED if speed is None else _SPEED.format(speed=speed)).replace("the pinion", of)
+
+
+def write_filled(path: Path, template: Path, **fields: object) -> None:
+    """Write a design file from a text with fields, comments of numbers in line.
+
+    Raises:
+        ValueError: if it cannot be written.
+    """
+    text = template.read_text(encoding="utf-8").format(name=path.name, **fields)
     lined = re.sub(r"^(\S[^#\n]*?|# \S+ = \S+) +# ", lambda found: f"{found[1]:<31} # ", text, flags=re.MULTILINE)
     with writing(path):
         write_durably(path, lambda file: file.write(lined.encode("utf-8")))
-    return pair
 
 
 def starter_pair(

@@ -11,7 +11,7 @@ meshes.max_flank_pressure, meshes.root_stress.planet_to_ring
 """
 
 from .cycle import StageCycle as StageCycle
-from .flanks import StageFlanks as StageFlanks
+from .flanks import PlanetFlanks as PlanetFlanks
 from .gears import StageGears as StageGears
 from .kinematics import Members as Members
 from .kinematics import Phasing as Phasing

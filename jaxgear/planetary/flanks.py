@@ -1,18 +1,17 @@
 """Modifications of the flanks of a stage as one design of its mesh of sun and planet."""
 
-from typing import NamedTuple, Self
-
 from jaxtyping import Array, Float
 
 from ..microgeometry import AbstractModification
 from ..microgeometry.base import Flank
+from .meshes import StageFlanks
 
 
-class StageFlanks(AbstractModification):
+class PlanetFlanks(AbstractModification):
     """Modification of a planet towards the sun, together with those of the mesh of planet and ring.
 
     In the place of the wheel's modification it makes a design of a pair of sun and planet one of the whole stage:
-    `lambda v: (sun, StageFlanks(to_sun, to_ring, ring))`. In that mesh it acts as `to_sun`.
+    `lambda v: (sun, PlanetFlanks(to_sun, to_ring, ring))`. In that mesh it acts as `to_sun`.
 
     Attributes:
         to_sun: modification of the flanks of the planets that carry with the sun; None for the nominal involute.
@@ -32,24 +31,11 @@ class StageFlanks(AbstractModification):
         return self.to_sun is not None and self.to_sun.varies_along_face
 
 
-class FourFlanks(NamedTuple):
-    """Modifications of a stage, as `solve_stage` takes them; None for nominal involutes.
+def of_design(sun: AbstractModification | None, planet: AbstractModification | None) -> StageFlanks:
+    """The modifications of a stage by a design of its pair of sun and planet.
 
-    Attributes:
-        sun, planet_to_sun, planet_to_ring, ring: as of `solve_stage`.
+    One of the planet that is no `PlanetFlanks` belongs to both its flanks, and the ring has none.
     """
-
-    sun: AbstractModification | None
-    planet_to_sun: AbstractModification | None
-    planet_to_ring: AbstractModification | None
-    ring: AbstractModification | None
-
-    @classmethod
-    def of(cls, sun: AbstractModification | None, planet: AbstractModification | None) -> Self:
-        """The modifications of a design of the pair of sun and planet.
-
-        One that is no `StageFlanks` belongs to both flanks of the planets, and the ring has none.
-        """
-        if isinstance(planet, StageFlanks):
-            return cls(sun, planet.to_sun, planet.to_ring, planet.ring)
-        return cls(sun, planet, planet, None)
+    if isinstance(planet, PlanetFlanks):
+        return StageFlanks(sun, planet.to_sun, planet.to_ring, planet.ring)
+    return StageFlanks(sun, planet, planet, None)

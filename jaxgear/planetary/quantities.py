@@ -1,6 +1,6 @@
 """Quantities of a whole planetary stage: objectives, limits, columns of sweeps.
 
-They are those of a design of the mesh of sun and planet, in the place of whose wheel stand `StageFlanks`, and need the
+They are those of a design of the mesh of sun and planet, in the place of whose wheel stand `PlanetFlanks`, and need the
 stage besides: `StageSettings.quantity` supplies it in Python, the table [stage] in a design file.
 """
 
@@ -13,11 +13,13 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from ..contact.status import Status
 from ..metrics import AbstractSettings, Analysis, Quantity, Vocabulary, peak_to_peak
-from ..numerics import Quantile, maximum, number
+from ..numerics import Quantile, maximum, number, real
 from .cycle import StageCycle
-from .flanks import FourFlanks
+from .flanks import of_design
 from .kinematics import driving_torque
+from .mesh_cycles import StageMeshes, mesh_cycles
 from .solve import PreparedStage, solve_stage
 
 Scalar = Float[Array, ""]
@@ -29,7 +31,7 @@ class StageSettings(AbstractSettings):
     """The stage of which a mesh of sun and planet is one.
 
     settings = StageSettings(prepare_stage(stage, sun=sun_mesh, ring=ring_mesh))
-    jaxgear.minimize(sun_mesh, torque / 3, lambda v: (sun(v), StageFlanks(to_sun(v), to_ring(v), ring(v))), bounds,
+    jaxgear.minimize(sun_mesh, torque / 3, lambda v: (sun(v), PlanetFlanks(to_sun(v), to_ring(v), ring(v))), bounds,
         objective=settings.quantity("stage_ppte"))
 
     The torque of such a design is that of one mesh, on the sun: the torque of the sun over the number of planets. The
@@ -60,6 +62,10 @@ class StageSettings(AbstractSettings):
         """The stage with the flanks and at the torque of an analysis."""
         return analysis.once(self, "stage", lambda: _solved(self.prepared, analysis))
 
+    def contacts(self, analysis: Analysis) -> StageMeshes:
+        """Contacts of all its meshes with the flanks and at the torque of an analysis."""
+        return analysis.once(self, "contacts", lambda: mesh_cycles(self.prepared, self.solve(analysis)))
+
     def solve_with_errors(self, analysis: Analysis) -> StageCycle:
         """The stages with pin errors, with an axis (samples,) in front.
 
@@ -82,7 +88,7 @@ class StageSettings(AbstractSettings):
 def _solved(prepared: PreparedStage, analysis: Analysis) -> StageCycle:
     stage, cycle = prepared.stage, analysis.cycle
     torque = driving_torque(stage, stage.planets * cycle.torque)
-    flanks = FourFlanks.of(cycle.pinion, cycle.wheel)
+    flanks = of_design(cycle.pinion, cycle.wheel)
     return solve_stage(prepared, torque, **flanks._asdict())
 
 
@@ -91,12 +97,18 @@ def _number(of: Callable[[StageCycle], Scalar], analysis: Analysis, settings: St
     return jnp.where(jnp.all(cycle.converged), of(cycle), jnp.nan)
 
 
+def _of_contacts(of: Callable[[StageMeshes], Scalar], analysis: Analysis, settings: StageSettings) -> Scalar:
+    meshes = settings.contacts(analysis)
+    fine = jnp.all(settings.solve(analysis).converged) & jnp.all(meshes.status == Status.CONVERGED)
+    return jnp.where(fine, of(meshes), jnp.nan)
+
+
 def _with_errors(of: Callable[[StageCycle], Scalar], analysis: Analysis, settings: StageSettings) -> Scalar:
     cycles = settings.solve_with_errors(analysis)
     values = jax.vmap(of)(cycles)
     alike = jnp.ones_like(values) / len(values)
     fine = jnp.all(cycles.converged)
-    return jnp.where(fine, Quantile(_LEVEL)(values, alike), jnp.nan)
+    return jnp.where(fine, Quantile(real(_LEVEL))(values, alike), jnp.nan)
 
 
 def _order(number: int, cycle: StageCycle) -> Scalar:
@@ -143,9 +155,26 @@ OF_STAGE: dict[str, tuple[Callable[[StageCycle], Scalar], str, str]] = {
         "force of a planet on its pin, largest peak to peak",
     ),
 }
+# of the contacts of all its meshes, in MPa
+OF_CONTACTS: dict[str, tuple[Callable[[StageMeshes], Scalar], str]] = {
+    "max_stage_flank_pressure": (
+        lambda meshes: meshes.max_flank_pressure,
+        "largest flank pressure in all meshes of the stage",
+    ),
+    "max_stage_corner_pressure": (
+        lambda meshes: meshes.max_corner_pressure,
+        "largest pressure of a tip corner in all meshes of the stage",
+    ),
+    "sun_root_stress": (lambda meshes: maximum(meshes.root_stress.sun), "largest local root stress of the sun"),
+    "planet_root_stress": (
+        lambda meshes: maximum(jnp.stack([meshes.root_stress.planet_to_sun, meshes.root_stress.planet_to_ring])),
+        "largest local root stress of the planets, whose teeth bend both ways",
+    ),
+    "ring_root_stress": (lambda meshes: maximum(meshes.root_stress.ring), "largest local root stress of the ring"),
+}
 WITH_ERRORS = "_with_pin_errors"
 _ROBUST = "stage_ppte", "load_sharing_factor", "peak_load_sharing_factor", "max_pin_force"
-_FORMS = {"N": ".0f"}
+_FORMS = {"N": ".0f", "MPa": ".0f"}
 
 
 def _quantity(name: str, of: Callable[..., Any], unit: str, meaning: str) -> Quantity:
@@ -155,6 +184,7 @@ def _quantity(name: str, of: Callable[..., Any], unit: str, meaning: str) -> Qua
 STAGE_QUANTITIES = Vocabulary(
     (
         *(_quantity(name, partial(_number, of), unit, meaning) for name, (of, unit, meaning) in OF_STAGE.items()),
+        *(_quantity(name, partial(_of_contacts, of), "MPa", meaning) for name, (of, meaning) in OF_CONTACTS.items()),
         *(
             _quantity(
                 f"{name}{WITH_ERRORS}",

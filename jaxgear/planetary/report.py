@@ -14,7 +14,6 @@ from ..metrics import peak_to_peak
 from ..numerics import program
 from ..report import Chapter, Figure, Part, Record, Table, numbers_of, table_of
 from .cycle import StageCycle
-from .flanks import FourFlanks
 from .kinematics import (
     gear_ratio,
     member_speeds,
@@ -24,11 +23,30 @@ from .kinematics import (
     phasing,
     planet_phases,
 )
+from .mesh_cycles import StageMeshes, mesh_cycles
+from .meshes import StageFlanks
 from .solve import PreparedStage, solve_stage
 from .stage import PlanetaryStage
 
 _ORDERS = 6
 _MEMBERS = "sun", "ring", "carrier"
+
+_FLANKS = {
+    "sun": "sun",
+    "planet_to_sun": "planet, flank to the sun",
+    "planet_to_ring": "planet, flank to the ring",
+    "ring": "ring",
+}
+
+
+def _pressure(mesh: str, kind: str, meshes: StageMeshes) -> float:
+    found = meshes.flank_pressure if kind == "flank" else meshes.corner_pressure
+    return float(jnp.max(getattr(found, mesh)))
+
+
+def _root_stress(flank: str, meshes: StageMeshes) -> float:
+    return float(jnp.max(getattr(meshes.root_stress, flank)))
+
 
 # of a cycle
 _NUMBERS: tuple[Record[StageCycle], ...] = (
@@ -45,37 +63,56 @@ _NUMBERS: tuple[Record[StageCycle], ...] = (
     Record("max_pin_force", "N", lambda cycle: jnp.max(cycle.pin_force), "largest force on a pin [N]", ".0f"),
 )
 
+# of the contacts of all planets
+_OF_MESHES: tuple[Record[StageMeshes], ...] = tuple(
+    Record(f"max_{mesh}_mesh_{kind}_pressure", "MPa", partial(_pressure, mesh, kind), heading.format(mesh), ".0f")
+    for kind, heading in (("flank", "flank pressure, {} [MPa]"), ("corner", "corner pressure, {} [MPa]"))
+    for mesh in ("sun", "ring")
+) + tuple(
+    Record(f"{flank}_root_stress", "MPa", partial(_root_stress, flank), f"root stress, {words} [MPa]", ".0f")
+    for flank, words in _FLANKS.items()
+)
+
 
 @program
 def stages_over_torques(
-    prepared: PreparedStage, torques: Float[Array, " torques"], flanks: FourFlanks
+    prepared: PreparedStage, torques: Float[Array, " torques"], flanks: StageFlanks
 ) -> tuple[StageCycle, StageCycle]:
     """The stage under several torques on the driving member [N m], without and with modifications of its flanks."""
 
     def of(share: Array, torque: Array) -> StageCycle:
         scaled = (None if each is None else share * each for each in flanks)
-        return solve_stage(prepared, torque, **FourFlanks(*scaled)._asdict())
+        return solve_stage(prepared, torque, **StageFlanks(*scaled)._asdict())
 
     shares = jnp.asarray([0.0, 1.0], torques.dtype)
     both = jax.vmap(jax.vmap(of, (None, 0)), (0, None))(shares, torques)
     return jax.tree.map(lambda leaf: leaf[0], both), jax.tree.map(lambda leaf: leaf[1], both)
 
 
-def part(over_torques: Mapping[str, StageCycle], speed: float | None) -> Part:
+def part(prepared: PreparedStage, over_torques: Mapping[str, StageCycle], speed: float | None) -> Part:
     """The stage under load with the flanks of several designs, for the terminal, the report and the files.
 
     Args:
+        prepared: prepared stage.
         over_torques: cycles of one stage under several torques by the name of their design, with an axis (torques,) in
             front: under the design torque, then over a range. The last one is the design of the report.
         speed: speed of the driving member [rpm]; None for none.
     """
     cycles = {name: jax.tree.map(lambda leaf: leaf[0], each) for name, each in over_torques.items()}
     name, cycle = list(cycles.items())[-1]
+    meshes = {name: mesh_cycles(prepared, each) for name, each in cycles.items()}
     numbers = table_of(_NUMBERS, cycles, "Planetary stage", "stage", across=True, note=_note(cycle))
     return Part(
-        tables=(numbers, _over_torques(over_torques)),
+        tables=(
+            numbers,
+            table_of(_OF_MESHES, meshes, "Meshes of the stage", "largest over planets", across=True),
+            _over_torques(over_torques),
+        ),
         chapters=tuple(_chapters(name, cycles, speed)),
-        data={name: {**numbers_of(_NUMBERS, each), **_lists(each)} for name, each in cycles.items()},
+        data={
+            name: {**numbers_of(_NUMBERS, each), **numbers_of(_OF_MESHES, meshes[name]), **_lists(each)}
+            for name, each in cycles.items()
+        },
         lines=tuple(_lines(cycles)),
         figures=tuple(partial(_drawn, name, cycles) for name in _FIGURES),
     )
@@ -93,7 +130,13 @@ def _over_torques(cycles: Mapping[str, StageCycle]) -> Table:
 
 
 def _note(cycle: StageCycle) -> str:
-    return f"{float(member_torques(cycle.stage, cycle.torque).sun):g} N m on the sun, base circle of the sun"
+    error = np.asarray(cycle.transmission_error)
+    half = np.ptp(error[::2]) - np.ptp(error)
+    return (
+        f"{float(member_torques(cycle.stage, cycle.torque).sun):g} N m on the sun, {len(error)} positions; half as many "
+        f"change its PPTE by {half:+.2g} µm. The pinion of the other tables is the sun and their wheel a planet, under the "
+        "share of a planet."
+    )
 
 
 def _lists(cycle: StageCycle) -> dict[str, Any]:
@@ -119,7 +162,7 @@ def _lines(cycles: Mapping[str, StageCycle]) -> Iterator[tuple[str, ...]]:
 def _chapters(name: str, cycles: Mapping[str, StageCycle], speed: float | None) -> Iterator[Chapter]:
     cycle = cycles[name]
     tables = [_members(cycle.stage, cycle.torque, speed), _planets(cycle), _orders(cycles)]
-    yield Chapter("Planetary stage", _texts(cycle.stage, speed), tables=tables, new_page=True)
+    yield Chapter("Planetary stage", tuple(_texts(cycle.stage, speed)), tables=tables, new_page=True)
 
 
 def _texts(stage: PlanetaryStage, speed: float | None) -> Iterator[str]:

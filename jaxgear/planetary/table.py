@@ -21,7 +21,7 @@ from ..microgeometry import AbstractModification, NoModification
 from ..numerics import real
 from ..report import Part
 from ..tolerance import TruncatedNormal
-from .flanks import FourFlanks, StageFlanks
+from .flanks import PlanetFlanks, of_design
 from .gears import StageGears
 from .kinematics import driving_torque, mesh_frequency
 from .quantities import WITH_ERRORS, StageSettings
@@ -49,12 +49,12 @@ class _StageDesign(FileDesign):
     outer: FileDesign
 
     def __call__(self, parameters: Mapping[str, Any]) -> tuple[AbstractModification, AbstractModification]:
-        """Modifications of the sun, and of planets and ring as `StageFlanks`."""
+        """Modifications of the sun, and of planets and ring as `PlanetFlanks`."""
         sun, to_sun = super().__call__(parameters)
         to_ring, ring = self.outer({name: parameters[name] for name in self.outer.names})
         if all(isinstance(each, NoModification) for each in (to_sun, to_ring, ring)):
             return sun, to_sun
-        return sun, StageFlanks(to_sun, to_ring, ring)
+        return sun, PlanetFlanks(to_sun, to_ring, ring)
 
 
 class StageSection(FurtherTable, section_of(PlanetaryStage, ("gears",), open=False)):  # type: ignore[misc]
@@ -199,9 +199,9 @@ class StageSection(FurtherTable, section_of(PlanetaryStage, ("gears",), open=Fal
         """The stage with the flanks of a design, for the terminal, the report and the files."""
         settings, (low, high) = self.settings(design), self._torques
         torques = np.concatenate([[self._torque], np.linspace(low, high, _TORQUES)])
-        flanks = FourFlanks.of(cycle.pinion, cycle.wheel)
-        unmodified, modified = stages_over_torques(settings.prepared, torques, flanks)
-        return part({"unmodified": unmodified, name: modified}, speed=self._speed)
+        flanks = of_design(cycle.pinion, cycle.wheel)
+        unmodified, modified = stages_over_torques(settings.prepared, real(torques), flanks)
+        return part(settings.prepared, {"unmodified": unmodified, name: modified}, speed=self._speed)
 
 
 def _names(content: object) -> set[str]:
