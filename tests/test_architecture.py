@@ -106,6 +106,7 @@ HEAVY = {
     "xarray",
     "xlsxwriter",
     "jaxgear.layout.figures",
+    "jaxgear.planetary.figures",
     "jaxgear.rating.figures",
     "jaxgear.plot",
 }
@@ -190,6 +191,7 @@ OF_ANY_TYPE = {
     "io/table_keys.py as_field": "a value of a file, for a field of any type",
     "io/table_keys.py entry": "stands for the value of a key, whose annotation says the type",
     "io/tables.py FurtherTable.check": "takes a `DesignFile`, whose file imports this one",
+    "io/tables.py FurtherTable.extended": "likewise",
     "io/tables.py FurtherTable.findings": "likewise",
     "io/tables.py FurtherTable.part": "likewise",
     "io/tables.py FurtherTable.quantity": "likewise",
@@ -253,6 +255,7 @@ TORQUE_BY_KEYWORD = {
     "io/gearbox.py support_of": "one of the keys of a file",
     "io/write_design.py write_design": "likewise: a file may do without most of them",
     "io/write_design.py write_starter": "likewise",
+    "planetary/starter.py write_stage_starter": "likewise",
     "rexs/write.py write_rexs": "likewise",
     "rexs/convert.py convert": "likewise",
 }

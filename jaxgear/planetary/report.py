@@ -132,10 +132,10 @@ def _over_torques(cycles: Mapping[str, StageCycle]) -> Table:
 def _note(cycle: StageCycle) -> str:
     error = np.asarray(cycle.transmission_error)
     half = np.ptp(error[::2]) - np.ptp(error)
+    torque = float(member_torques(cycle.stage, cycle.torque).sun)
     return (
-        f"{float(member_torques(cycle.stage, cycle.torque).sun):g} N m on the sun, {len(error)} positions; half as many "
-        f"change its PPTE by {half:+.2g} µm. The pinion of the other tables is the sun and their wheel a planet, under the "
-        "share of a planet."
+        f"{torque:g} N m on the sun, {len(error)} positions; half as many change the PPTE by {half:+.2g} µm. In the other "
+        "tables the sun is the pinion and a planet, under its share of the load, the wheel."
     )
 
 

@@ -36,6 +36,7 @@ _TORQUES = 9  # over the range of the file
 _FEWEST_POSITIONS = 16  # a multiple of it and of the number of planets
 # tables that the mesh of planet and ring has in common with that of sun and planet
 _SHARED = "title", "materials", "model", "resolution"
+_WITHOUT_VARIABLES = "variables", "stage", "type", "curve"
 _LEFT_OUT = "tolerance", "misalignment", "shafts", "teeth", "layout", "wear", "dynamics", "rating"
 
 
@@ -205,9 +206,9 @@ class StageSection(FurtherTable, section_of(PlanetaryStage, ("gears",), open=Fal
 
 
 def _names(content: object) -> set[str]:
-    """All texts of a content but those of its variables: the names of those that it uses are among them."""
+    """All texts of a content but those of its variables and of the stage: names that it uses are among them."""
     if isinstance(content, str):
         return {content}
     if isinstance(content, Mapping):
-        return set().union(*(_names(each) for name, each in content.items() if name != "variables"))
+        return set().union(*(_names(each) for name, each in content.items() if name not in _WITHOUT_VARIABLES))
     return set().union(*map(_names, content)) if isinstance(content, list) else set()
