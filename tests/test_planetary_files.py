@@ -172,3 +172,12 @@ def test_new_stage(tmp_path):
     refused = CliRunner().invoke(app, ["new", str(tmp_path / "b.toml"), *given, "--planetary", "4"])
     assert isinstance(refused.exception, ValueError) and "90 teeth of sun and ring" in str(refused.exception)
     assert not (tmp_path / "b.toml").exists()
+
+
+def test_losses_of_a_stage_need_speed_and_friction(tmp_path):
+    """The part of the power that the carrier takes along is not lost: 1 - (1 - eta_0) i_0 / (i_0 - 1)."""
+    without = load(tmp_path, BARE.replace("speed = 1500.0", ""))
+    with pytest.raises(DesignFileError, match=r'"stage_efficiency" needs load\.speed'):
+        quantity_named(without, "of", "stage_efficiency")
+    with pytest.raises(DesignFileError, match=r"needs load\.friction or the table \[lubricant\]"):
+        quantity_named(load(tmp_path, BARE), "of", "stage_efficiency")

@@ -7,20 +7,22 @@ stage besides: `StageSettings.quantity` supplies it in Python, the table [stage]
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Literal
 
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..contact.status import Status
-from ..metrics import AbstractSettings, Analysis, Quantity, Vocabulary, peak_to_peak
+from ..metrics import AbstractSettings, Analysis, Lubricant, Quantity, Vocabulary, peak_to_peak
 from ..numerics import Quantile, maximum, number, real
 from .cycle import StageCycle
 from .flanks import of_design
-from .kinematics import driving_torque
+from .kinematics import driving_torque, member_speeds
+from .losses import StageLosses, stage_losses
 from .mesh_cycles import StageMeshes, mesh_cycles
 from .solve import PreparedStage, solve_stage
+from .stage import PlanetaryStage
 
 Scalar = Float[Array, ""]
 
@@ -31,8 +33,9 @@ class StageSettings(AbstractSettings):
     """The stage of which a mesh of sun and planet is one.
 
     settings = StageSettings(prepare_stage(stage, sun=sun_mesh, ring=ring_mesh))
-    jaxgear.minimize(sun_mesh, torque / 3, lambda v: (sun(v), PlanetFlanks(to_sun(v), to_ring(v), ring(v))), bounds,
-        objective=settings.quantity("stage_ppte"))
+    design = lambda v: (sun(v), PlanetFlanks(to_sun(v), to_ring(v), ring(v)))
+    objective = settings.quantity("stage_ppte")
+    jaxgear.minimize(jaxgear.Problem(sun_mesh, torque / 3, design, bounds, objective=objective))
 
     The torque of such a design is that of one mesh, on the sun: the torque of the sun over the number of planets. The
     stage is solved at the positions that it was prepared at, whatever those of the mesh.
@@ -41,6 +44,7 @@ class StageSettings(AbstractSettings):
         prepared: prepared stage.
         pin_errors: tangential displacements of the pins of many stages, in addition to those of the stage, shape
             (samples, planets); None for the stage alone.
+        lubricant: lubricant, for losses; None where the load has a coefficient of friction.
     """
 
     table: ClassVar[str] = "stage"
@@ -49,6 +53,7 @@ class StageSettings(AbstractSettings):
     pin_errors: Float[Array, "samples planets"] | None = number(
         "um", shape=("samples", "planets"), optional=True, default=None
     )
+    lubricant: Lubricant | None = None
 
     def check_together(self) -> None:
         planets = self.prepared.stage.planets
@@ -64,7 +69,15 @@ class StageSettings(AbstractSettings):
 
     def contacts(self, analysis: Analysis) -> StageMeshes:
         """Contacts of all its meshes with the flanks and at the torque of an analysis."""
-        return analysis.once(self, "contacts", lambda: mesh_cycles(self.prepared, self.solve(analysis)))
+        point = analysis.operating_point
+        speed = None if point.speed is None else point.speed / _relative_speed(self.prepared.stage)
+        options = {"speed": speed, "friction": point.friction}
+        return analysis.once(self, "contacts", lambda: mesh_cycles(self.prepared, self.solve(analysis), **options))
+
+    def losses(self, analysis: Analysis) -> StageLosses:
+        """Losses of the flanks of all meshes with the flanks and at torque and speed of an analysis."""
+        cycle, meshes = self.solve(analysis), self.contacts(analysis)
+        return analysis.once(self, "losses", lambda: stage_losses(cycle, meshes, self.lubricant))
 
     def solve_with_errors(self, analysis: Analysis) -> StageCycle:
         """The stages with pin errors, with an axis (samples,) in front.
@@ -92,6 +105,12 @@ def _solved(prepared: PreparedStage, analysis: Analysis) -> StageCycle:
     return solve_stage(prepared, torque, **flanks._asdict())
 
 
+def _relative_speed(stage: PlanetaryStage) -> Scalar:
+    """Speed of the sun against the carrier over that of the driving member."""
+    unit = member_speeds(stage, 1.0)
+    return jnp.abs(unit.sun - unit.carrier)
+
+
 def _number(of: Callable[[StageCycle], Scalar], analysis: Analysis, settings: StageSettings) -> Scalar:
     cycle = settings.solve(analysis)
     return jnp.where(jnp.all(cycle.converged), of(cycle), jnp.nan)
@@ -101,6 +120,10 @@ def _of_contacts(of: Callable[[StageMeshes], Scalar], analysis: Analysis, settin
     meshes = settings.contacts(analysis)
     fine = jnp.all(settings.solve(analysis).converged) & jnp.all(meshes.status == Status.CONVERGED)
     return jnp.where(fine, of(meshes), jnp.nan)
+
+
+def _of_losses(of: Callable[[StageLosses], Scalar], analysis: Analysis, settings: StageSettings) -> Scalar:
+    return jnp.where(jnp.all(settings.solve(analysis).converged), of(settings.losses(analysis)), jnp.nan)
 
 
 def _with_errors(of: Callable[[StageCycle], Scalar], analysis: Analysis, settings: StageSettings) -> Scalar:
@@ -172,6 +195,16 @@ OF_CONTACTS: dict[str, tuple[Callable[[StageMeshes], Scalar], str]] = {
     ),
     "ring_root_stress": (lambda meshes: maximum(meshes.root_stress.ring), "largest local root stress of the ring"),
 }
+# of its losses, at the speed of the load
+OF_LOSSES: dict[str, tuple[Callable[[StageLosses], Scalar], str, str, Literal["smaller", "larger"]]] = {
+    "stage_efficiency": (
+        lambda losses: losses.efficiency,
+        "",
+        "efficiency of the stage by the losses of its flanks",
+        "larger",
+    ),
+    "stage_loss_power": (lambda losses: losses.loss_power, "W", "power that the flanks of the stage lose", "smaller"),
+}
 WITH_ERRORS = "_with_pin_errors"
 _ROBUST = "stage_ppte", "load_sharing_factor", "peak_load_sharing_factor", "max_pin_force"
 _FORMS = {"N": ".0f", "MPa": ".0f"}
@@ -185,6 +218,10 @@ STAGE_QUANTITIES = Vocabulary(
     (
         *(_quantity(name, partial(_number, of), unit, meaning) for name, (of, unit, meaning) in OF_STAGE.items()),
         *(_quantity(name, partial(_of_contacts, of), "MPa", meaning) for name, (of, meaning) in OF_CONTACTS.items()),
+        *(
+            replace(_quantity(name, partial(_of_losses, of), unit, meaning), better=better)
+            for name, (of, unit, meaning, better) in OF_LOSSES.items()
+        ),
         *(
             _quantity(
                 f"{name}{WITH_ERRORS}",

@@ -10,7 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from ..metrics import peak_to_peak
+from ..metrics import Lubricant, peak_to_peak
 from ..numerics import program
 from ..report import Chapter, Figure, Part, Record, Table, numbers_of, table_of
 from .cycle import StageCycle
@@ -23,6 +23,7 @@ from .kinematics import (
     phasing,
     planet_phases,
 )
+from .losses import StageLosses, stage_losses
 from .mesh_cycles import StageMeshes, mesh_cycles
 from .meshes import StageFlanks
 from .solve import PreparedStage, solve_stage
@@ -73,6 +74,11 @@ _OF_MESHES: tuple[Record[StageMeshes], ...] = tuple(
     for flank, words in _FLANKS.items()
 )
 
+_OF_LOSSES: tuple[Record[StageLosses], ...] = (
+    Record("stage_efficiency", "", lambda losses: losses.efficiency, "efficiency", ".5f"),
+    Record("stage_loss_power", "W", lambda losses: losses.loss_power, "power loss [W]", ".1f"),
+)
+
 
 @program
 def stages_over_torques(
@@ -89,7 +95,13 @@ def stages_over_torques(
     return jax.tree.map(lambda leaf: leaf[0], both), jax.tree.map(lambda leaf: leaf[1], both)
 
 
-def part(prepared: PreparedStage, over_torques: Mapping[str, StageCycle], speed: float | None) -> Part:
+def part(
+    prepared: PreparedStage,
+    over_torques: Mapping[str, StageCycle],
+    speed: float | None,
+    friction: float | None = None,
+    lubricant: Lubricant | None = None,
+) -> Part:
     """The stage under load with the flanks of several designs, for the terminal, the report and the files.
 
     Args:
@@ -97,10 +109,15 @@ def part(prepared: PreparedStage, over_torques: Mapping[str, StageCycle], speed:
         over_torques: cycles of one stage under several torques by the name of their design, with an axis (torques,) in
             front: under the design torque, then over a range. The last one is the design of the report.
         speed: speed of the driving member [rpm]; None for none.
+        friction: mean coefficient of friction; None for that of the lubricant, if there is one.
+        lubricant: lubricant; None for none.
     """
     cycles = {name: jax.tree.map(lambda leaf: leaf[0], each) for name, each in over_torques.items()}
     name, cycle = list(cycles.items())[-1]
-    meshes = {name: mesh_cycles(prepared, each) for name, each in cycles.items()}
+    meshes = {name: mesh_cycles(prepared, each, speed=speed, friction=friction) for name, each in cycles.items()}
+    of_losses = {}
+    if speed is not None and (lubricant is not None or friction is not None):
+        of_losses = {name: stage_losses(each, meshes[name], lubricant) for name, each in cycles.items()}
     numbers = table_of(_NUMBERS, cycles, "Planetary stage", "stage", across=True, note=_note(cycle))
     return Part(
         tables=(
@@ -111,6 +128,7 @@ def part(prepared: PreparedStage, over_torques: Mapping[str, StageCycle], speed:
         chapters=tuple(_chapters(name, cycles, speed)),
         data={
             name: {**numbers_of(_NUMBERS, each), **numbers_of(_OF_MESHES, meshes[name]), **_lists(each)}
+            | (numbers_of(_OF_LOSSES, of_losses[name]) if of_losses else {})
             for name, each in cycles.items()
         },
         lines=tuple(_lines(cycles)),
@@ -134,8 +152,8 @@ def _note(cycle: StageCycle) -> str:
     half = np.ptp(error[::2]) - np.ptp(error)
     torque = float(member_torques(cycle.stage, cycle.torque).sun)
     return (
-        f"{torque:g} N m on the sun, {len(error)} positions; half as many change the PPTE by {half:+.2g} µm. In the other "
-        "tables the sun is the pinion and a planet, under its share of the load, the wheel."
+        f"{torque:g} N m on the sun, {len(error)} positions; half as many change the PPTE by {half:+.2g} µm. In the "
+        "other tables the sun is the pinion and a planet, under its share of the load, the wheel."
     )
 
 

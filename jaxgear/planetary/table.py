@@ -24,7 +24,7 @@ from ..tolerance import TruncatedNormal
 from .flanks import PlanetFlanks, of_design
 from .gears import StageGears
 from .kinematics import driving_torque, mesh_frequency
-from .quantities import WITH_ERRORS, StageSettings
+from .quantities import OF_LOSSES, WITH_ERRORS, StageSettings
 from .report import part, stages_over_torques
 from .solve import prepare_stage
 from .stage import PlanetaryStage
@@ -174,6 +174,11 @@ class StageSection(FurtherTable, section_of(PlanetaryStage, ("gears",), open=Fal
         """A quantity of the stage."""
         if quantity.name.endswith(WITH_ERRORS) and self.pin_tolerance is None:
             raise DesignFileError(key, f'"{quantity.name}" needs stage.pin_tolerance')
+        if quantity.name in OF_LOSSES:
+            if design.speed is None:
+                raise DesignFileError(key, f'"{quantity.name}" needs load.speed')
+            if design.friction is None and "lubricant" not in design.tables:
+                raise DesignFileError(key, f'"{quantity.name}" needs load.friction or the table [lubricant]')
         return quantity.with_settings(self.settings(design))
 
     def settings(self, design: DesignFile) -> StageSettings:
@@ -186,7 +191,8 @@ class StageSection(FurtherTable, section_of(PlanetaryStage, ("gears",), open=Fal
         for name, each in (("sun", design), ("ring", self._outer)):
             sizes = each.resolution()
             meshes[name] = each.mesh(replace(sizes, positions=step * -(-sizes.positions // step)))
-        made = StageSettings(prepare_stage(stage, **meshes), self._pin_errors(stage.planets))
+        lubricant = design.tables.get("lubricant")
+        made = StageSettings(prepare_stage(stage, **meshes), self._pin_errors(stage.planets), lubricant)
         self._made = design, made
         return made
 
@@ -202,7 +208,8 @@ class StageSection(FurtherTable, section_of(PlanetaryStage, ("gears",), open=Fal
         torques = np.concatenate([[self._torque], np.linspace(low, high, _TORQUES)])
         flanks = of_design(cycle.pinion, cycle.wheel)
         unmodified, modified = stages_over_torques(settings.prepared, real(torques), flanks)
-        return part(settings.prepared, {"unmodified": unmodified, name: modified}, speed=self._speed)
+        cycles = {"unmodified": unmodified, name: modified}
+        return part(settings.prepared, cycles, self._speed, design.friction, settings.lubricant)
 
 
 def _names(content: object) -> set[str]:
