@@ -36,10 +36,10 @@ from .meshes import AbstractStageMesh as AbstractStageMesh
 from .meshes import MeshForces as MeshForces
 from .meshes import StageFlanks as StageFlanks
 from .meshes import TableMesh as TableMesh
-from .response import StageResponse as StageResponse
-from .response import stage_response as stage_response
 from .quantities import STAGE_QUANTITIES as STAGE_QUANTITIES
 from .quantities import StageSettings as StageSettings
+from .response import StageResponse as StageResponse
+from .response import stage_response as stage_response
 from .solve import PreparedStage as PreparedStage
 from .solve import prepare_stage as prepare_stage
 from .solve import solve_stage as solve_stage
