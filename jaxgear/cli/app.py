@@ -105,6 +105,7 @@ def new(
             metavar="N", help="A planetary stage with N planets; the teeth are those of sun and planets.", min=2
         ),
     ] = None,
+    ring: Annotated[bool, typer.Option("--ring", help="The wheel is a ring gear.")] = False,
 ) -> int:
     """Write a commented design file for a pair, ready for `analyze` and `optimize`.
 

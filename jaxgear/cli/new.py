@@ -10,7 +10,7 @@ from ..io.write_design import write_starter
 from ..provided import provided
 from . import interrupt, terminal
 
-_NO_STAGE = {"helix_angle": 0.0, "pressure_angle": 20.0, "profile_shift": (0.0, 0.0)}
+_NO_STAGE = {"helix_angle": 0.0, "pressure_angle": 20.0, "profile_shift": (0.0, 0.0), "ring": False}
 
 
 def new(path: Path, teeth: tuple[int, int], *, planets: int | None = None, **given: Any) -> None:

@@ -411,13 +411,14 @@ def outermost(mesh: Mesh, removed: RemovedMaterial) -> Curve:
     They are taken to be modified as the last pair is where it begins and the first one where it ends the base pitch.
     What falls off there, as root relief does up the flank, may go on falling at the same rate, and a contact that
     slides there may slide farther: twice what sliding gains at the edge is taken off (of 4,000 random flanks of up to
-    1000 um, one touches before).
+    1000 um, one touches before), but never more than to unmodified flanks, or to twice the excess material of the path.
     """
     removed = jax.lax.stop_gradient(removed)
     amount, gain = removed.amount, _sliding_gain(mesh, removed.shift)
     edge = jnp.stack([amount[-1, :, 0], amount[0, :, -1]])
     fall = jnp.minimum(edge - jnp.stack([amount[-1, :, 1], amount[0, :, -2]]), 0.0)
-    left = (edge - 2 * gain)[..., None] + fall[..., None] * _outer_steps(mesh)
+    excess = 2 * jnp.minimum(minimum(amount, axis=(0, 1, 2)), 0.0)
+    left = jnp.maximum(edge - 2 * gain, excess)[..., None] + fall[..., None] * _outer_steps(mesh)
     if mesh.support_gap is not None:
         left = left + mesh.outer_lever * mesh.support_gap[None, :, None]
     return jnp.min(mesh.outer_gap + left / mesh.outer_lever, axis=(0, 1))

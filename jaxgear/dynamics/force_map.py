@@ -101,7 +101,9 @@ def _coast_phase(mesh: Mesh):
     """First mesh position of the coast flanks, index of the position of the first drive position, and backlash."""
     pair, count = mesh.pair, mesh.resolution.positions
     secant = 1 / jnp.cos(pair.working_pressure_angle)
-    thickness = [tooth_thickness(gear, 2 * gear.base_radius * secant) for gear in (pair.pinion, pair.wheel)]
+    thickness = [
+        tooth_thickness(gear, 2 * gear.signed(gear.base_radius) * secant) for gear in (pair.pinion, pair.wheel)
+    ]
     middle = 0.5 + (thickness[0] - thickness[1]) / (2 * pair.base_pitch * secant)
     first = mesh.resolution.first_phase
     places = (middle - mesh.kinematics.first_phase - first) * count

@@ -185,7 +185,7 @@ def mesh_tables(
         map_dte=np.maximum.accumulate(np.concatenate([-beyond[1, :, ::-1], beyond[0]], axis=1), axis=1),
         map_force=np.concatenate([-force[1, :, ::-1], force[0]], axis=1),
         teeth=np.array([int(gear.teeth) for gear in gears]),
-        base_radius=np.array([float(gear.base_radius) for gear in gears]),
+        base_radius=np.array([float(gear.signed(gear.base_radius)) for gear in gears]),
         inertia=np.array([float(inertia_of(gear)) for gear in gears]),
         equivalent_mass=float(equivalent_mass(mesh.pair)),
         status=np.max([np.asarray(made.status).max(), *(np.asarray(cycle.status).max() for cycle in cycles)]),  # type: ignore[attr-defined]

@@ -181,6 +181,11 @@ class GearPair(Checked):
         """Teeth of the wheel over teeth of the pinion."""
         return self.wheel.teeth / self.pinion.teeth
 
+    @property
+    def signed_gear_ratio(self) -> Real:
+        """Gear ratio u = z2 / z1 with the sign of ISO 21771, negative for an internal pair."""
+        return self.wheel.signed(self.gear_ratio)
+
 
 class PairGeometry(eqx.Module):
     """Generated geometry of a gear pair.

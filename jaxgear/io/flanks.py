@@ -160,14 +160,15 @@ def read_flank(
         side: the gear's side of the contact, of `mesh.sides`: a table that is not on its flank is refused. It may reach
             5 % of active profile and face over their ends, and leave out 20 % at each. None takes any table.
         revolutions: revolutions of the pinion, for a file with worn flanks after several numbers of revolutions.
-        base_radius: base radius of the gear [mm], for files without roll lengths where no side is given.
+        base_radius: base radius of the gear [mm], negative for a ring gear, for files without roll lengths where no
+            side is given.
         method: method of interpolation along the profile.
 
     Raises:
-        ValueError: for a base radius that is not positive, or beside a side.
+        ValueError: for a base radius of zero, or beside a side.
         DesignFileError: when the file cannot be read, is no flank or not one of the side; the message is one line.
     """
-    check("base_radius", base_radius, "mm", low=0.0, open_low=True)
+    check("base_radius", None if base_radius is None else abs(base_radius), "mm", low=0.0, open_low=True)
     if side is not None and base_radius is not None:
         raise ValueError(f"read_flank: base_radius = {base_radius:g} mm has no effect beside side")
     with naming(path):
@@ -197,13 +198,16 @@ class FlankFileSection(FileTable):
     method: str = entry(choice("linear", "natural_cubic", "monotonic"), "linear")
 
 
-def flank_template(section: FlankFileSection, folder: Path, base_radius: float | None) -> template.Template:
+def flank_template(
+    section: FlankFileSection, folder: Path, base_radius: float | None, internal: bool = False
+) -> template.Template:
     """Template of the modification that a table of a design file takes from a flank file.
 
     Args:
         section: the table.
         folder: folder of the design file.
         base_radius: base radius of the gear [mm]; None where variables decide it, the file then needs roll lengths.
+        internal: True for a ring gear.
     """
     path = folder / section.file
     with referring(f"{section.key}.file", path.name):
@@ -213,7 +217,7 @@ def flank_template(section: FlankFileSection, folder: Path, base_radius: float |
             gear = section.key.partition(".")[0]
         method: Any = section.method
         rows = _at_revolutions(_chosen(rows, {_GEAR: gear, "design": section.design}), section.revolutions)
-        flank, reach = flank_of_rows(rows, base_radius, method)
+        flank, reach = flank_of_rows(rows, base_radius, method, internal)
     return template.Template(_FromFile(path.name, reach), {"flank": flank}, section.key)
 
 
@@ -253,9 +257,9 @@ class _FromFile:
 
 
 def flank_of_rows(
-    rows: Rows, base_radius: float | None, method: Method = "linear"
+    rows: Rows, base_radius: float | None, method: Method = "linear", internal: bool = False
 ) -> tuple[TabulatedProfile | TabulatedFlank, FlankRange]:
-    """Flank of the rows, and the range that they cover.
+    """Flank of the rows, and the range that they cover; roll lengths are negative of a ring gear, `internal`.
 
     Raises:
         DesignFileError: where they are no flank.
@@ -268,13 +272,15 @@ def flank_of_rows(
     profile = [row for row in rows if row.get("trace") != "helix"]
     if not profile:
         raise DesignFileError("", "holds a helix alone, must hold a profile")
-    roll, face, removed = _grid(profile, amount, base_radius)
+    sign = -1.0 if internal or (base_radius is not None and base_radius < 0) else 1.0
+    size = None if base_radius is None else abs(base_radius)
+    roll, face, removed = _grid(profile, amount, size, sign)
     if amount == MEASURED and 0 < (spread := float(np.ptp(removed))) < AMOUNTS.low:
         raise DesignFileError("", f"has {MEASURED} within {spread:.3g} um, {AMOUNTS.remark}")
     if len(face) > 1 and helix:
         raise DesignFileError("", f"has a helix beside profiles at {len(face)} face coordinates, must be one profile")
     if helix:
-        along, across, line = _grid(helix, amount, base_radius)
+        along, across, line = _grid(helix, amount, size, sign)
         if len(along) > 1:
             raise DesignFileError("", f"has a helix at {len(along)} roll lengths, must be one")
         if len(across) < 2:
@@ -324,9 +330,9 @@ def _at_revolutions(rows: Rows, revolutions: float | None) -> Rows:
     return [row for row, is_wanted in zip(rows, wanted) if is_wanted]
 
 
-def _grid(rows: Rows, amount: str, base_radius: float | None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _grid(rows: Rows, amount: str, base_radius: float | None, sign: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Roll lengths, face coordinates and material removed, shape (rolls, faces), of points on a grid."""
-    along, removed = _along(rows, base_radius), _AMOUNTS[amount] * numbers_of(rows, amount)
+    along, removed = sign * _along(rows, base_radius, sign), _AMOUNTS[amount] * numbers_of(rows, amount)
     across = numbers_of(rows, _ACROSS) if _ACROSS in rows[0] else np.zeros(len(rows))
     roll, row = np.unique(along, return_inverse=True)
     face, column = np.unique(across, return_inverse=True)
@@ -339,9 +345,11 @@ def _grid(rows: Rows, amount: str, base_radius: float | None) -> tuple[np.ndarra
     return roll, face, table + 0.0
 
 
-def _along(rows: Rows, base_radius: float | None) -> np.ndarray:
+def _along(rows: Rows, base_radius: float | None, sign: float) -> np.ndarray:
+    """Sizes of the roll lengths [mm]; all numbers of a ring gear, of negative sign, may be positive."""
     if _ALONG in rows[0]:
         found = numbers_of(rows, _ALONG)
+        found = sign * found if (found <= 0).all() else found
         if (found < 0).any():
             raise DesignFileError("", f"{_ALONG} = {found.min():g} mm must be at least 0 mm (base circle)")
         return found

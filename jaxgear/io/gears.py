@@ -134,7 +134,11 @@ def flank_of(section: AnyGear, folder: Path, gear: Template, *, coast: bool) -> 
     given = section.modification if own is None else own
     has_files = any(isinstance(each, FlankFileSection) for each in given)
     base_radius = float(gear.build({}).base_radius) if has_files and not gear.free() else None
-    return [flank_template(each, folder, base_radius) if isinstance(each, FlankFileSection) else each for each in given]
+    internal = isinstance(section, RingSection)
+    return [
+        flank_template(each, folder, base_radius, internal) if isinstance(each, FlankFileSection) else each
+        for each in given
+    ]
 
 
 def drawing_of(section: AnyGear) -> dict[str, Any]:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..geometry import Gear, GearPair
+from ..geometry import Gear, GearPair, RingGear
 from ..microgeometry import AbstractModification
 from ..numerics import check, compile_quickly, fields_of, real
 from ..numerics.durable import write_durably
@@ -30,6 +30,8 @@ _RACK = "pressure_angle = {angle!r}         # deg\n"
 _FILLET = "root_radius = {radius:.4f}          # x module, c_P / (1 - sin(alpha)) of ISO 53\n"
 _SHIFT = "profile_shift = {shift!r}          # x module\n"
 _NO_SHIFT = "# profile_shift = 0.0           # x module\n"
+_RIM = "# rim_diameter = {rim:.1f}          # mm, where the ring is held; a rim of 3.5 modules where it is not given\n"
+_CUTTER = "# cutter_teeth = {teeth:.0f}             # of the pinion-type cutter; 0.4 z where they are not given\n"
 _SPEED = "speed = {speed!r}                # rpm of the pinion\n"
 _NO_SPEED = "# speed = 1500.0                # rpm of the pinion, for temperatures, film and loss\n"
 
@@ -45,6 +47,7 @@ def write_starter(
     helix_angle: float = 0.0,
     pressure_angle: float = 20.0,
     profile_shift: tuple[float, float] = (0.0, 0.0),
+    ring: bool = False,
 ) -> GearPair:
     """Write a commented design file of a pair, ready for `jaxgear analyze` and `jaxgear optimize`.
 
@@ -59,6 +62,7 @@ def write_starter(
         pressure_angle: pressure angle of the basic rack [deg]; below 20 degrees with the root radius of ISO 53 for its
             clearance.
         profile_shift: profile shift of pinion and wheel [x module].
+        ring: True if the wheel is a ring gear.
 
     Returns:
         the pair.
@@ -69,12 +73,16 @@ def write_starter(
     """
     path = check_new(path, torque, speed)
     compile_quickly()
-    pair = starter_pair(teeth, module, face_width, helix_angle, pressure_angle, profile_shift)
+    pair = starter_pair(teeth, module, face_width, helix_angle, pressure_angle, profile_shift, ring)
     rule = iso_relief(pair, torque)
     amount, length = float(rule.amount), max(float(rule.length), _SHORTEST * module)
     rack = "" if pressure_angle == _PRESSURE_ANGLE else _RACK.format(angle=pressure_angle)
-    rack += _FILLET.format(radius=float(pair.pinion.root_radius)) if pressure_angle < _PRESSURE_ANGLE else ""
+    fillet = _FILLET.format(radius=float(pair.pinion.root_radius)) if pressure_angle < _PRESSURE_ANGLE else ""
     shifts = [_SHIFT.format(shift=shift) if shift else _NO_SHIFT for shift in profile_shift]
+    mate_shift = shifts[1] if profile_shift[1] else ""
+    if ring:
+        rim, cutter = -2 * float(pair.wheel.bore_radius), float(np.asarray(pair.wheel.cutter_teeth))
+        mate_shift += _RIM.format(rim=rim) + _CUTTER.format(teeth=cutter)
     write_filled(
         path,
         _STARTER,
@@ -85,10 +93,12 @@ def write_starter(
         face_width=face_width,
         distance=float(pair.working_center_distance),
         torque=torque,
-        rack=rack,
+        mate="ring" if ring else "wheel",
+        rack=rack + fillet,
+        mate_rack=rack if ring else rack + fillet,
         shift=shifts[0],
-        mate_shift=shifts[1] if profile_shift[1] else "",
-        hand=_HAND.format(angle=helix_angle) if helix_angle else _SPUR,
+        mate_shift=mate_shift,
+        hand="" if ring else _HAND.format(angle=helix_angle) if helix_angle else _SPUR,
         speed=speed_line(speed),
         amount=amount,
         most=max(_MOST * amount, _LEAST_MOST),
@@ -145,6 +155,7 @@ def starter_pair(
     helix_angle: float = 0.0,
     pressure_angle: float = _PRESSURE_ANGLE,
     profile_shift: tuple[float, float] = (0.0, 0.0),
+    ring: bool = False,
 ) -> GearPair:
     """The pair of `write_starter`, with its arguments.
 
@@ -152,21 +163,22 @@ def starter_pair(
         ValueError: for gears that are not possible.
     """
     fillet: Any = None
+    kinds: Any = Gear, RingGear if ring else Gear
     if pressure_angle < _PRESSURE_ANGLE:
         # of ISO 53: c_P / (1 - sin(alpha)), so that the rack is straight down to the addendum of the mate
         radius = (_DEDENDUM - _ADDENDUM) / (1 - np.sin(np.deg2rad(pressure_angle)))
         fillet = real(np.floor(1e4 * radius) / 1e4)
     pinion, wheel = (
-        Gear(
+        make(
             real(count),
             real(module),
             real(pressure_angle),
             real(shift),
             face_width=real(face_width),
             helix_angle=real(hand),
-            root_radius=fillet,
+            root_radius=None if make is RingGear else fillet,
         )
-        for count, shift, hand in zip(teeth, profile_shift, (helix_angle, -helix_angle))
+        for make, count, shift, hand in zip(kinds, teeth, profile_shift, (helix_angle, -helix_angle))
     )
     return GearPair(pinion, wheel)
 
@@ -198,9 +210,10 @@ def write_design(
     """
     check("torque", torque, "N m", low=0.0, open_low=True)
     lines = [f"title = {_text(printable(title))}", ""] if title else []
-    for name, quality in zip(("pinion", "wheel"), quality_classes or (None, None)):
+    names = "pinion", "ring" if pair.wheel.is_internal else "wheel"
+    for name, gear, quality in zip(names, pair.gears, quality_classes or (None, None)):
         classes = [] if quality is None else [f"quality_class = {quality}  # ISO 1328-1"]
-        lines += [f"[{name}]", *_gear(getattr(pair, name)), *classes, ""]
+        lines += [f"[{name}]", *_gear(gear), *classes, ""]
     mounting = []
     if pair.center_distance is not None:
         mounting.append(f"center_distance = {_value(pair.center_distance)}  # mm")
@@ -209,7 +222,7 @@ def write_design(
     lines += ["[pair]", *mounting, ""] if mounting else []
     lines += ["[load]", f"torque = {_value(torque)}  # N m, on the pinion"]
     lines += [f"speed = {_value(speed)}  # rpm, of the pinion"] if speed is not None else []
-    for name, modification in (("pinion", pinion), ("wheel", wheel)):
+    for name, modification in zip(names, (pinion, wheel)):
         for term in describe(modification):
             lines += ["", f"[[{name}.modification]]", *_term(term)]
     text = "\n".join(lines) + "\n"
@@ -218,7 +231,7 @@ def write_design(
 
 
 def _gear(gear: Gear) -> Iterator[str]:
-    numbers = fields_of(Gear)
+    numbers = fields_of(type(gear))
     for name, number in numbers.items():
         value = getattr(gear, name)
         if value is not None:

@@ -127,11 +127,13 @@ def ohlendorf_loss_factor(pair: GearPair) -> Scalar:
     """
     path = path_of_contact(pair)
     ratios = path.end / path.base_pitch, -path.start / path.base_pitch
-    return loss_factor_at(pair.pinion.teeth, pair.gear_ratio, ratios, pair.pinion.base_helix_angle)
+    return loss_factor_at(pair.pinion.teeth, pair.signed_gear_ratio, ratios, pair.pinion.base_helix_angle)
 
 
 def loss_factor_at(teeth: Real, gear_ratio: Real, tip_contact_ratios: tuple[Real, Real], base_helix: Real) -> Real:
-    """`ohlendorf_loss_factor` of the teeth of the pinion, u, the contact ratios eps_1, eps_2, and beta_b [rad]."""
+    """`ohlendorf_loss_factor` of the teeth of the pinion, u, the contact ratios eps_1, eps_2, and beta_b [rad]; u is
+    negative with a ring gear.
+    """
     recess, approach = tip_contact_ratios
     share = 1 - (recess + approach) + recess**2 + approach**2
     return jnp.pi * (gear_ratio + 1) / (teeth * gear_ratio) * share / jnp.cos(base_helix)
@@ -268,7 +270,7 @@ def bulk_temperature(cycle: MeshCycle, lubricant: Lubricant) -> Scalar:
              (ISO/TS 6336-22); what tip relief spares is in the loss of the contact analysis.
     """
     if lubricant.bulk == "loss":
-        area = _center_distance(cycle) * cycle.kinematics.pair.face_width
+        area = cycle.kinematics.pair.working_center_distance * cycle.kinematics.pair.face_width
         rise = loss_rise(loss_power(cycle, lubricant), area)
     else:
         rise = FLASH_SHARE * _mean_over_path(cycle, lubricated_flash_temperature(cycle, lubricant))
@@ -354,13 +356,6 @@ def _mean_over_path(cycle: MeshCycle, field: Load) -> Scalar:
     over_face = jnp.einsum("psn,s->pn", field, width) / jnp.sum(width)
     # every position stands for as much of the path as there are pairs on it
     return safe_divide(jnp.sum(jnp.mean(over_face, axis=-1)), kinematics.path_of_contact.contact_ratio)
-
-
-def _center_distance(cycle: MeshCycle) -> Scalar:
-    """Sum of the working pitch radii [mm]."""
-    contact = cycle.kinematics.path_of_contact
-    pinion = jnp.hypot(contact.pinion_base_radius, contact.pinion_pitch_roll_length)
-    return pinion + jnp.hypot(contact.wheel_base_radius, contact.wheel_pitch_roll_length)
 
 
 def _friction(cycle: MeshCycle, lubricant: Lubricant | None) -> Scalar:

@@ -335,7 +335,7 @@ def rating_factors(cycle: MeshCycle) -> dict[str, Float[Array, ""]]:
     zone, elasticity, sharing, helix, *single = map(safe_sqrt, squares)
     tangential = cycle.force * cosine
     per_area = tangential / (2 * pair.pinion.pitch_radius * pair.face_width)
-    pitting = zone * elasticity * sharing * helix * safe_sqrt(per_area * (1 + 1 / pair.gear_ratio))
+    pitting = zone * elasticity * sharing * helix * safe_sqrt(per_area * (1 + 1 / pair.signed_gear_ratio))
     root_helix = root_helix_factor(pair)
     found = {
         "tangential_force_N": tangential,

@@ -199,7 +199,7 @@ def _rate(
 def _turns(geometry: MeshGeometry, rating: Rating) -> OfGears:
     """Load cycles of both gears per revolution of the pinion."""
     contacts = jnp.stack([gear.contacts_per_revolution for gear in rating.gears])
-    return contacts * geometry.teeth[0] / geometry.teeth
+    return contacts * jnp.abs(geometry.teeth[0] / geometry.teeth)
 
 
 def _cycles(

@@ -69,7 +69,7 @@ def _of_mesh(rating: Rating, found: PairRating) -> Iterator[Finding]:
         ratio = float(factors.resonance_ratio)
         yield Finding("resonance ratio N", "", ratio, _BELOW if ratio < 1 else _ABOVE)
     first, second = map(float, geometry.profile_shift)
-    teeth = list(map(float, geometry.teeth))
+    teeth = [abs(float(number)) for number in geometry.teeth]
     if teeth[0] > teeth[1]:  # 1 is the smaller gear of c', whatever drives
         first, second = second, first
     yield _finding("profile shift x1 - x2", round(first - second, _DIGITS))

@@ -141,7 +141,8 @@ def _work_hardening(
     ratio = mate.hardness / gear.hardness
     low, high = _HARDNESS_RATIOS
     slope = jnp.where(ratio < low, 0.0, jnp.where(ratio > high, _MOST_SLOPE, 0.00898 * ratio - 0.00829))
-    larger = jnp.maximum(geometry.gear_ratio, 1 / geometry.gear_ratio)
+    ratio = jnp.abs(geometry.gear_ratio)
+    larger = jnp.maximum(ratio, 1 / ratio)
     return 1 + slope * (jnp.minimum(larger, _MOST_RATIO) - 1), one
 
 

@@ -186,7 +186,7 @@ def load_factors(
         shared = transverse_load_factors(geometry, mesh * deviation / (load * dynamic * face))
     else:
         shared = rating.transverse_load_factor, rating.transverse_load_factor
-    u = geometry.gear_ratio
+    u = jnp.abs(geometry.gear_ratio)
     return LoadFactors(
         application=application,
         mesh=sharing,
@@ -286,7 +286,10 @@ def running_in_relief(rating: Rating) -> Scalar:
 
 
 def reduced_mass(pair: GearPair, geometry: MeshGeometry, rating: Rating) -> Scalar:
-    """m_red = m_1 m_2 / (m_1 + m_2) [kg/mm] of m_i = J_i / (b r_bi^2), J given or of a ring from bore to mid tooth."""
+    """m_red = m_1 m_2 / (m_1 + m_2) [kg/mm] of m_i = J_i / (b r_bi^2), J given or of a ring from bore to mid tooth.
+
+    A ring gear reaches from mid tooth to its rim diameter.
+    """
     first, second = (
         _mass(gear) if settings.moment_of_inertia is None else _given_mass(gear, settings.moment_of_inertia, geometry)
         for gear, settings in zip(pair.gears, rating.gears)
@@ -302,6 +305,8 @@ def _mass(gear: Gear) -> Scalar:
     """Moment of inertia per face width over the squared base radius [kg/mm]."""
     outer = 0.5 * (gear.tip_radius + gear.root_circle_radius)
     inner = jnp.zeros_like(outer) if gear.bore_diameter is None else gear.bore_radius
+    if gear.is_internal:
+        outer, inner = gear.bore_radius, outer
     # density in kg/m^3 is 1e-9 kg/mm^3
     return jnp.pi / 2 * gear.material.density * _MM**3 * (outer**4 - inner**4) / gear.base_radius**2
 

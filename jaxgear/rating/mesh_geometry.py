@@ -7,7 +7,7 @@ References:
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ..geometry import GearPair, PathOfContact, check_external, path_of_contact
+from ..geometry import GearPair, PathOfContact, path_of_contact
 from ..numerics import Checked, Given, real, result
 
 Scalar = Float[Array, ""]
@@ -19,6 +19,8 @@ _MM = 1e-3
 
 class MeshGeometry(Checked):
     """Geometry of a mesh as ISO 6336 needs it; arrays (gears,) hold pinion and wheel, arrays (points,) A to E.
+
+    Teeth and diameters of a ring gear are negative, as in ISO 21771: u and the curvature of its flank are then too.
 
     Attributes:
         teeth: z.
@@ -69,7 +71,7 @@ class MeshGeometry(Checked):
 
     @property
     def gear_ratio(self) -> Scalar:
-        """u, teeth of the wheel over teeth of the pinion."""
+        """u, teeth of the wheel over teeth of the pinion; negative for an internal pair."""
         return self.teeth[1] / self.teeth[0]
 
     @property
@@ -140,11 +142,7 @@ def mesh_geometry(pair: GearPair, path: PathOfContact | None = None) -> MeshGeom
     Args:
         pair: gear pair.
         path: its path of contact, where it is known.
-
-    Raises:
-        ValueError: for a ring gear.
     """
-    check_external(*pair.gears)
     path = path_of_contact(pair) if path is None else path
     pinion, gears = pair.pinion, pair.gears
     helix = jnp.zeros_like(pinion.module) if pinion.helix_angle is None else jnp.abs(jnp.deg2rad(pinion.helix_angle))
@@ -155,14 +153,14 @@ def mesh_geometry(pair: GearPair, path: PathOfContact | None = None) -> MeshGeom
 
     base = both(lambda gear: 2 * gear.base_radius)
     return MeshGeometry(
-        teeth=both(lambda gear: gear.teeth),
+        teeth=both(lambda gear: gear.signed(gear.teeth)),
         module=pinion.module,
         pressure_angle=jnp.deg2rad(pinion.pressure_angle),
         helix_angle=helix,
         base_helix_angle=jnp.abs(pinion.base_helix_angle),
         transverse_pressure_angle=pinion.transverse_pressure_angle,
         working_pressure_angle=working,
-        center_distance=0.5 * jnp.sum(base) / jnp.cos(working),
+        center_distance=0.5 * jnp.abs(jnp.sum(base)) / jnp.cos(working),
         face_width=pair.face_width,
         face_widths=both(lambda gear: gear.face_width),
         reference_diameter=both(lambda gear: 2 * gear.pitch_radius),

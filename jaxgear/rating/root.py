@@ -20,6 +20,7 @@ OfGears = Float[Array, " gears"]
 TEST_GEAR = 2.0  # Y_ST
 _OVERHANG = 1.0  # modules per side, by which a wider gear counts at most
 _RIM = 2.242, 1.6, 0.5, 1.2  # Y_B = 1.6 ln(2.242 h_t / s_R) for s_R / h_t from 0.5 to 1.2
+_RING_RIM = 8.324, 1.15, 1.75, 3.5  # Y_B = 1.15 ln(8.324 m_n / s_R) for s_R / m_n from 1.75 to 3.5
 _FINEST = 4  # tolerance class, up to which deep teeth share the load
 _DEEP = 2.05, 2.5, 2.366, 0.666, 0.7  # Y_DT
 _ROUGHNESSES = 1.0, 40.0  # R_z [um] that Y_RrelT is known for
@@ -131,11 +132,14 @@ def _of_several(overlap: Scalar, virtual: Scalar) -> Scalar:
 
 
 def rim_factor(gear: Gear) -> Scalar:
-    """Y_B of an external gear by the thickness of its rim over the height of its teeth; 1 of a solid gear."""
-    if gear.rim_thickness is None:
+    """Y_B by the rim thickness over the tooth height, of ring gears over the module; 1 of a solid gear."""
+    if gear.is_internal:
+        (share, slope, thinnest, thick), ratio = _RING_RIM, gear.body_thickness / gear.module
+    elif gear.rim_thickness is None:
         return jnp.ones_like(gear.module)
-    share, slope, thinnest, thick = _RIM
-    ratio = gear.rim_thickness / (gear.tip_radius - gear.root_circle_radius)
+    else:
+        share, slope, thinnest, thick = _RIM
+        ratio = gear.rim_thickness / (gear.tip_radius - gear.root_circle_radius)
     return jnp.where(ratio >= thick, 1.0, slope * jnp.log(share / jnp.clip(ratio, thinnest, thick)))
 
 

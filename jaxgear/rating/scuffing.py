@@ -273,7 +273,7 @@ def _geometry_factor(geometry: MeshGeometry) -> Scalar:
     """X_BE at the tip of the pinion."""
     pinion, wheel = geometry.curvatures(geometry.path[-1])
     slip = jnp.abs(jnp.sqrt(pinion) - jnp.sqrt(wheel / geometry.gear_ratio))
-    return 0.51 * jnp.sqrt(geometry.gear_ratio + 1) * slip / (pinion * wheel) ** 0.25
+    return 0.51 * jnp.sqrt(jnp.abs(geometry.gear_ratio + 1)) * slip / jnp.abs(pinion * wheel) ** 0.25
 
 
 def _approach_ratio(geometry: MeshGeometry) -> Scalar:

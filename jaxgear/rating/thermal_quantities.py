@@ -51,6 +51,9 @@ def thermal_of(analysis: Analysis, rating: Rating) -> ThermalRating:
     def worked_out() -> ThermalRating:
         found, speed = rating_of(analysis, rating), analysis.operating_point.speed
         assert speed is not None
+        dips = rating.lubricant is not None and rating.lubricant.wheel_immersion is not None
+        if dips and analysis.cycle.kinematics.pair.wheel.is_internal:
+            raise ValueError("lubricant.wheel_immersion: the losses of a ring gear that dips into oil are not covered")
         return thermal_rating(found, analysis.cycle.torque, speed, rating, tip_reliefs(analysis))
 
     return analysis.once(rating, "thermal", worked_out)

@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ..contact.status import Status, Statuses, status_of
-from ..geometry import Gear, GearPair, check_external, margins
+from ..geometry import Gear, GearPair, margins
 from ..numerics import Checked, changed, concrete, number, program, within_limits
 from .housing import Housing
 from .misalignment import Misalignment
@@ -117,7 +117,6 @@ class Gearbox(Checked):
         _check_single("shaft", names)
         _check_single("gear", [gear.name for shaft in self.shafts for gear in shaft.gears])
         _check_single("bearing", list(self.bearing_names))
-        check_external(*(gear.gear for shaft in self.shafts for gear in shaft.gears))
         for mesh in self.meshes:
             for name in (mesh.pinion, mesh.wheel):
                 _check_known("gear", name, [gear.name for shaft in self.shafts for gear in shaft.gears])

@@ -147,6 +147,10 @@ class MountedGear(Checked):
     position: Scalar = number("mm")
     body_diameter: Scalar | None = number("mm", low=0.0, open_low=True, optional=True, default=None)
 
+    def check_together(self) -> None:
+        if self.gear.is_internal:
+            raise ValueError(f'MountedGear: gear "{self.name}" is a ring gear: shafts carry external gears alone')
+
     @property
     def start(self) -> Scalar:
         """Left end of the face [mm]."""

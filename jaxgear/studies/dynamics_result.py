@@ -199,7 +199,7 @@ class DynamicsResult(AbstractStudyResult):
         settings, pair = self.settings, self.design.pair()
         given = ("pinion", pair.pinion, settings.pinion_inertia), ("wheel", pair.wheel, settings.wheel_inertia)
         for name, gear, inertia in given:
-            if gear.bore_diameter is None and inertia is None:
+            if gear.bore_diameter is None and inertia is None and not gear.is_internal:
                 yield (
                     f"{name}: no bore_diameter, the inertia is of a solid disc, {float(inertia_of(gear)):.3g} kg m2, "
                     f"and the compliance that of a bore of {2 * float(gear.bore_radius):.3g} mm; give bore_diameter or "

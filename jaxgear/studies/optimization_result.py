@@ -216,7 +216,7 @@ def _place(side: Side, modification: AbstractModification, end: int, further: fl
     """Diameter and roll angle of a roll length, counted from an end of the active profile."""
     surface = jax.tree.map(np.asarray, flank_surface(side, modification))
     base = np.sqrt((0.5 * surface.diameter[-1]) ** 2 - surface.roll_length[-1] ** 2)
-    roll = max(float(surface.roll_length[end]) + further, 0.0)
+    roll = max(float(side.gear.signed(surface.roll_length[end] + further)), 0.0)
     return f"diameter {2 * np.hypot(base, roll):.3f} mm (roll angle {np.rad2deg(roll / base):.2f} deg)"
 
 

@@ -127,10 +127,11 @@ def profile_trace(
         points: their number.
 
     Raises:
-        ValueError: for less than 2 points, a face coordinate that is not finite, or a roll length that is negative.
+        ValueError: for less than 2 points, a face coordinate that is not finite, or a roll length that is negative, of
+            a ring gear positive.
     """
     check("face_coordinate", face_coordinate, "mm")
-    check("roll_length", roll_length, "mm", low=0.0)
+    _check_roll_length(side, roll_length)
     if roll_length is None:
         whole("points", points, 2)
         roll_length = jnp.linspace(side.start_roll_length, side.tip_roll_length, points)
@@ -158,15 +159,20 @@ def helix_trace(
         points: their number.
 
     Raises:
-        ValueError: for less than 2 points, or a roll length that is negative.
+        ValueError: for less than 2 points, or a roll length that is negative, of a ring gear positive.
     """
     dtype = side.start_roll_length.dtype
-    check("roll_length", roll_length, "mm", low=0.0)
+    _check_roll_length(side, roll_length)
     roll = side.pitch_roll_length if roll_length is None else jnp.asarray(roll_length, dtype)
     if face_coordinate is None:
         whole("points", points, 2)
         face_coordinate = jnp.linspace(-0.5, 0.5, points, dtype=dtype) * side.face_width
     return _helix(side, modification, tolerance, roll, jnp.asarray(face_coordinate, dtype))
+
+
+def _check_roll_length(side: Side, roll_length: Given | None) -> None:
+    internal = side.gear.is_internal
+    check("roll_length", roll_length, "mm", low=None if internal else 0.0, high=0.0 if internal else None)
 
 
 @program

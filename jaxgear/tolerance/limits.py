@@ -74,7 +74,10 @@ class ToleranceClass(Checked):
         """Tolerances of a gear of 5 to 1000 teeth."""
         check("ToleranceClass: teeth", gear.teeth, "", low=5.0, high=1000.0)
         return cls(
-            2 * gear.pitch_radius, gear.module, gear.face_width, real(quality_class, "ToleranceClass: quality_class")
+            2 * gear.signed(gear.pitch_radius),
+            gear.module,
+            gear.face_width,
+            real(quality_class, "ToleranceClass: quality_class"),
         )
 
     @property

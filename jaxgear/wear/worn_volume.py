@@ -266,7 +266,8 @@ def worn(
     # grid interval of every sampling point, and the place within it
     base, knots, next_knots = (_first(of, 6) for of in (place.base_radius, *place.roll_length.T[:2]))
     step = next_knots - knots
-    at = jnp.clip((safe_sqrt(2 * base * place.arcs(line_load, shift)) - knots) / step, 0.0, points - 1)
+    roll = jnp.copysign(safe_sqrt(2 * base * place.arcs(line_load, shift)), base)
+    at = jnp.clip((roll - knots) / step, 0.0, points - 1)
     cell = jnp.minimum(jax.lax.stop_gradient(at).astype(jnp.int32), points - 2)
     ahead = at - cell.astype(at.dtype)
     gear = _first(jnp.arange(gears, dtype=jnp.int32), 6)
