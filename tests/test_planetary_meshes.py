@@ -3,6 +3,7 @@
 External pairs stand for both meshes where the equilibrium is argued, for which they make no difference.
 """
 
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -126,6 +127,13 @@ def test_counter_phased_planets_suppress_odd_harmonics():
         carried = np.sum(found.pair_force, axis=1)
         np.testing.assert_allclose(carried, np.take_along_axis(np.asarray(force), place, axis=1), rtol=1e-9)
         np.testing.assert_allclose(found.force, np.mean(carried, axis=1), rtol=1e-12)
+
+
+def test_tilted_pins_need_slices():
+    stage = prepared(26, 62)
+    tilted = replace(stage, stage=replace(stage.stage, radial_pin_tilt=np.ones(PLANETS)))
+    with pytest.raises(ValueError, match="which a mesh of 1 slice cannot show"):
+        solved(tilted)
 
 
 @pytest.mark.slow

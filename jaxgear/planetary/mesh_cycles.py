@@ -10,7 +10,6 @@ from ..contact import Mesh, MeshCycle, OperatingPoint
 from ..contact.solve import flanks_of, mesh_cycle
 from ..contact.status import Statuses
 from ..metrics import root_stress
-from ..microgeometry import AbstractModification
 from ..numerics import Given, changed, check, maximum, program, real
 from .cycle import StageCycle
 from .kinematics import member_speeds, mesh_force
@@ -168,40 +167,40 @@ def mesh_cycles(
     force = mesh_force(cycle.stage, cycle.torque) / cycle.stage.planets
     curves = (cycle.sun_approach, cycle.sun_force), (cycle.ring_approach, cycle.ring_force)
     flanks = cycle.flanks.at_sun, cycle.flanks.at_ring
-    return StageMeshes(
-        *(
-            _cycles(mesh, force, approach, forces, modified, turning, friction)
-            for mesh, (approach, forces), modified, turning in zip(placed, curves, flanks, speeds)
-        )
+    given = zip(placed, curves, flanks, cycle.stage.gap_slopes(force), speeds)
+    sun, ring = (
+        _cycles(_loaded(mesh, force, modified, slope), mesh.mesh, *of_planets, modified, turning, friction)
+        for mesh, of_planets, modified, slope, turning in given
     )
+    return StageMeshes(sun, ring)
 
 
 def _cycles(
-    placed: PlacedMesh,
-    force: Scalar,
+    loaded: LoadedMesh,
+    mesh: Mesh,
     approach: Curves,
     forces: Curves,
     flanks: Flanks,
     speed: Given | None,
     friction: Given | None,
 ) -> MeshCycle:
-    """Cycles of one mesh of all planets under a mean force [N] at which the material removed is taken."""
-    dtype = placed.mesh.slice_width.dtype
-    pinion, wheel = flanks_of(placed.mesh, *flanks)
+    """Cycles of one mesh of all planets."""
+    dtype = mesh.slice_width.dtype
+    pinion, wheel = flanks_of(mesh, *flanks)
     running = [None if each is None else real(each).astype(dtype) for each in (speed, friction)]
-    contacts = _contacts(_loaded(placed, force, pinion, wheel), approach.astype(dtype))
 
     def of_planet(mesh: Mesh, force: Scalar, contact: dict[str, Array]) -> MeshCycle:
         point = OperatingPoint(1e-3 * force * mesh.pair.pinion.base_radius, *running)
         return mesh_cycle(mesh, point, contact, pinion, wheel)
 
-    return eqx.filter_vmap(of_planet)(placed.mesh, jnp.mean(forces, axis=-1).astype(dtype), contacts)
+    contacts = _contacts(loaded, approach.astype(dtype))
+    return eqx.filter_vmap(of_planet)(mesh, jnp.mean(forces, axis=-1).astype(dtype), contacts)
 
 
 # two programs: that of the contacts, by far the longer one to compile, serves every kind of modification
 @program
-def _loaded(placed: PlacedMesh, force: Scalar, pinion: AbstractModification, wheel: AbstractModification) -> LoadedMesh:
-    return placed.loaded(force, pinion, wheel)
+def _loaded(placed: PlacedMesh, force: Scalar, flanks: Flanks, slope: Planets | None) -> LoadedMesh:
+    return placed.loaded(force, flanks, slope)
 
 
 @program

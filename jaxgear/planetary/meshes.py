@@ -94,18 +94,17 @@ class AbstractPlacedMesh(eqx.Module):
         """Number of mesh positions over one base pitch."""
 
     @abstractmethod
-    def loaded(
-        self, force: Scalar, pinion: AbstractModification | None, wheel: AbstractModification | None
-    ) -> AbstractLoadedMesh:
+    def loaded(self, force: Scalar, flanks: Flanks, slope: Planets | None = None) -> AbstractLoadedMesh:
         """The meshes with flank modifications.
 
         Args:
             force: mean force of a planet [N], at which the width of the contact is taken over which modifications are
                 averaged.
-            pinion, wheel: modifications; None for nominal involutes.
+            flanks: modifications of pinion and wheel; None for nominal involutes.
+            slope: slope of the gap over the face [um/mm], shape (planets,); None for none.
 
         Raises:
-            ValueError, TypeError: for modifications that such a mesh cannot have.
+            ValueError, TypeError: for modifications or slopes that such a mesh cannot have.
         """
 
 
@@ -200,16 +199,16 @@ class PlacedTable(AbstractPlacedMesh, AbstractLoadedMesh):
         """Number of mesh positions over one base pitch."""
         return self.knots.shape[-1]
 
-    def loaded(
-        self, force: Scalar, pinion: AbstractModification | None, wheel: AbstractModification | None
-    ) -> AbstractLoadedMesh:
+    def loaded(self, force: Scalar, flanks: Flanks, slope: Planets | None = None) -> AbstractLoadedMesh:
         """The table itself.
 
         Raises:
-            ValueError: for modifications: those of a table are in its numbers.
+            ValueError: for modifications and slopes: those of a table are in its numbers.
         """
-        if pinion is not None or wheel is not None:
+        if any(each is not None for each in flanks):
             raise ValueError("a table holds the modifications of its flanks: none can be given for it")
+        if slope is not None:
+            raise ValueError("a table holds the load over the face: pins cannot tilt")
         return self
 
     def forces(self, approach: Curves) -> MeshForces:
@@ -282,13 +281,18 @@ class PlacedMesh(AbstractPlacedMesh):
         """Number of mesh positions over one base pitch."""
         return self.mesh.resolution.positions
 
-    def loaded(
-        self, force: Scalar, pinion: AbstractModification | None, wheel: AbstractModification | None
-    ) -> "LoadedMesh":
-        """The meshes with the material that modifications remove."""
+    def loaded(self, force: Scalar, flanks: Flanks, slope: Planets | None = None) -> "LoadedMesh":
+        """The meshes with the material that modifications remove, and with the gap by a slope."""
+        if slope is not None and self.mesh.resolution.slices == 1:
+            raise ValueError("pins tilt over the face, which a mesh of 1 slice cannot show: Resolution(slices=11)")
         torque = 1e-3 * force * self.mesh.pair.pinion.base_radius[0]
-        flanks, dtype = flanks_of(self.mesh, pinion, wheel), self.mesh.slice_width.dtype
-        removed = eqx.filter_vmap(lambda mesh: material_of(mesh, torque.astype(dtype), *flanks))(self.mesh)
+        given, dtype = flanks_of(self.mesh, *flanks), self.mesh.slice_width.dtype
+
+        def of_planet(mesh: Mesh, slope: Scalar | None) -> RemovedMaterial:
+            removed = material_of(mesh, torque.astype(dtype), *given)
+            return removed if slope is None else removed + slope.astype(dtype) * mesh.face_coordinate[None, :, None]
+
+        removed = eqx.filter_vmap(of_planet)(self.mesh, slope)
         return LoadedMesh(for_contact(self.mesh), removed, self.steps)
 
 

@@ -103,17 +103,17 @@ def solve_stage(
 
 
 @program
-def _solved(prepared: PreparedStage, torque: Float[Array, ""], given: StageFlanks) -> StageCycle:
+def _solved(prepared: PreparedStage, torque: Float[Array, ""], flanks: StageFlanks) -> StageCycle:
     stage, placed = prepared.stage, (prepared.sun, prepared.ring)
     force = mesh_force(stage, torque)
     springs = linkage(stage, force)
-    sun, ring = (
-        mesh.loaded(force / stage.planets, *flanks) for mesh, flanks in zip(placed, (given.at_sun, given.at_ring))
-    )
+    mean = force / stage.planets
+    given = zip(placed, (flanks.at_sun, flanks.at_ring), stage.gap_slopes(mean))
+    sun, ring = (mesh.loaded(mean, modified, slope) for mesh, modified, slope in given)
     widths = jnp.stack([mesh.width.astype(force.dtype) for mesh in placed])
     usual = jnp.concatenate([_USUAL_STIFFNESS * widths, springs.pin])
     guess = jnp.broadcast_to(usual[:, None, None], (len(usual), stage.planets, prepared.sun.positions))
     found = equilibrium(springs, (sun, ring), guess)
     windup = (prepared.sun.windup + prepared.ring.windup).astype(force.dtype) * force
     approach = springs.stretch(found.motion) - springs.offset[:, :, None]
-    return StageCycle.of(stage, torque, found, windup, approach[:2], given)
+    return StageCycle.of(stage, torque, found, windup, approach[:2], flanks)

@@ -15,6 +15,16 @@ Planets = Float[Array, " planets"]
 
 Member = Literal["sun", "ring", "carrier"]
 
+_OF_PLANETS = (
+    "angles",
+    "radial_pin_error",
+    "tangential_pin_error",
+    "radial_pin_tilt",
+    "tangential_pin_tilt",
+    "sun_gap",
+    "ring_gap",
+)
+
 _MOST_PLANETS = 12
 # Angles that are rounded to 0.001 deg miss a pitch of (z_s + z_r) teeth by less than this share.
 _MISSED_PITCH = 2e-3
@@ -43,6 +53,13 @@ class PlanetaryStage(Checked):
             member, None for a rigid support.
         radial_pin_error, tangential_pin_error: displacement of every pin from its place [um], shape (planets,); None
             for none. A negative tangential one lags: this planet carries more.
+        radial_pin_tilt, tangential_pin_tilt: slope of every pin over the face [um/mm], shape (planets,), positive where
+            it lies farther out, or farther the way the carrier is pushed, at positive face coordinates; None for none.
+            It takes meshes with slices, whose face coordinates count the same way along the axis. Planets do not tilt
+            on their pins.
+        pin_tilt_compliance: tangential tilt of all pins by the wind-up of the carrier, over the mean tangential force
+            on a pin [um/(mm N)], positive where pins give way more at positive face coordinates; None for a stiff
+            carrier.
         sun_gap, ring_gap: gap of every planet's mesh with sun and ring on the line of action [um], shape (planets,), as
             thinner teeth make it; None for none.
 
@@ -62,13 +79,16 @@ class PlanetaryStage(Checked):
     carrier_support: Scalar | None = number("N/um", low=0.0, optional=True, default=None, kw_only=True)
     radial_pin_error: Planets | None = _planets("um")
     tangential_pin_error: Planets | None = _planets("um")
+    radial_pin_tilt: Planets | None = _planets("um/mm")
+    tangential_pin_tilt: Planets | None = _planets("um/mm")
+    pin_tilt_compliance: Scalar | None = number("um/(mm N)", optional=True, default=None, kw_only=True)
     sun_gap: Planets | None = _planets("um")
     ring_gap: Planets | None = _planets("um")
 
     def check_together(self) -> None:
         if self.fixed == self.driving:
             raise ValueError(f'PlanetaryStage: driving = "{self.driving}" must not be the fixed member')
-        for name in ("angles", "radial_pin_error", "tangential_pin_error", "sun_gap", "ring_gap"):
+        for name in _OF_PLANETS:
             value = getattr(self, name)
             if value is not None and value.shape != (self.planets,):
                 raise ValueError(
@@ -117,6 +137,26 @@ class PlanetaryStage(Checked):
         if self.angles is not None:
             return jnp.deg2rad(self.angles)
         return 2 * jnp.pi / self.planets * jnp.arange(self.planets, dtype=self.gears.module.dtype)
+
+    def gap_slopes(self, force: Scalar) -> tuple[Planets | None, Planets | None]:
+        """Slopes of the gaps of every planet's meshes with sun and ring over the face, by the tilt of the pins [um/mm].
+
+            zeta' sin(alpha_w,s) + eta' cos(alpha_w,s)   and   -zeta' sin(alpha_w,r) + eta' cos(alpha_w,r)
+
+        of a radial tilt zeta' and a tangential one eta', shape (planets,) each; None where no pin tilts.
+
+        Args:
+            force: mean force of a planet's mesh on the line of action [N].
+        """
+        radial, tangential, compliance = self.radial_pin_tilt, self.tangential_pin_tilt, self.pin_tilt_compliance
+        if radial is None and tangential is None and compliance is None:
+            return None, None
+        angles = self.gears.working_pressure_angles
+        zeta, eta = (jnp.zeros_like(self.planet_angles) if each is None else each for each in (radial, tangential))
+        if compliance is not None:
+            eta = eta + compliance * force * sum(jnp.cos(angle) for angle in angles)
+        sun, ring = (sign * zeta * jnp.sin(angle) + eta * jnp.cos(angle) for sign, angle in zip((1, -1), angles))
+        return sun, ring
 
     @property
     def least_planet_distance(self) -> Scalar:
