@@ -1,5 +1,6 @@
 """Kinematics of planetary stages: ratios, torques, phases, what phasing suppresses, and what cannot be assembled."""
 
+import jax
 import numpy as np
 import pytest
 
@@ -132,3 +133,6 @@ def test_efficiency_by_the_basic_efficiency(fixed, driving, closed):
     own = stage(26, 64, fixed=fixed, driving=driving)
     assert np.isclose(planetary.stage_efficiency(own, 0.97), closed(-64 / 26, 0.97), rtol=1e-14)
     assert np.isclose(planetary.stage_efficiency(own, 1.0), 1.0, rtol=1e-14)
+    single = jax.tree.map(lambda leaf: leaf.astype(np.float32), own)
+    found = planetary.stage_efficiency(single, 0.97)
+    assert found.dtype == np.float32 and np.isclose(found, closed(-64 / 26, 0.97), rtol=1e-6)

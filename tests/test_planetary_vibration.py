@@ -85,6 +85,10 @@ def test_torsional_stage_of_two_planets():
     np.testing.assert_allclose(modes.frequency, np.sqrt(1e6 * expected) / (2 * np.pi), rtol=1e-9, atol=1e-3)
     assert sorted(modes.kinds) == ["planet", "rotation", "rotation", "rotation"]
     np.testing.assert_allclose(np.sum(modes.kinetic_energy, axis=1), 1.0)
+    single = jax.tree.map(lambda leaf: leaf.astype(np.float32), own)
+    rounded = natural_modes(stage_system(single, INERTIAS, **MESHES, torsional=True)).frequency
+    assert rounded.dtype == np.float32
+    np.testing.assert_allclose(rounded, modes.frequency, rtol=1e-5, atol=3.0)
 
 
 def test_response_of_the_reference_stage():

@@ -47,7 +47,8 @@ def member_torques(stage: PlanetaryStage, torque: Given) -> Members:
         stage: the stage.
         torque: size of the torque on the driving member [N m].
     """
-    sun = real(torque) / driving_torque(stage, 1.0)
+    given = driving_torque(stage, 1.0)
+    sun = real(torque).astype(given.dtype) / given
     ratio = stage.gears.ring_teeth / stage.gears.sun_teeth
     return Members(sun, sun * ratio, -sun * (1 + ratio), jnp.zeros_like(sun))
 
@@ -65,7 +66,10 @@ def mesh_force(stage: PlanetaryStage, torque: Given) -> Scalar:
 def driving_torque(stage: PlanetaryStage, torque: Given) -> Scalar:
     """Size of the torque on the driving member [N m] that belongs to one on the sun."""
     ratio = stage.gears.ring_teeth / stage.gears.sun_teeth
-    return real(torque) * {"sun": jnp.ones_like(ratio), "ring": ratio, "carrier": 1 + ratio}[stage.driving]
+    return (
+        real(torque).astype(ratio.dtype)
+        * {"sun": jnp.ones_like(ratio), "ring": ratio, "carrier": 1 + ratio}[stage.driving]
+    )
 
 
 def member_speeds(stage: PlanetaryStage, speed: Given) -> Members:
@@ -80,7 +84,7 @@ def member_speeds(stage: PlanetaryStage, speed: Given) -> Members:
     zero, one = jnp.zeros_like(sun_teeth), jnp.ones_like(sun_teeth)
     # speeds where the carrier rests, before the fixed member is brought to rest
     relative = {"sun": one, "ring": -sun_teeth / ring_teeth, "carrier": zero}
-    scale = real(speed) / (relative[stage.driving] - relative[stage.fixed])
+    scale = real(speed).astype(one.dtype) / (relative[stage.driving] - relative[stage.fixed])
     sun, ring, carrier = (scale * (relative[member] - relative[stage.fixed]) for member in ("sun", "ring", "carrier"))
     return Members(sun, ring, carrier, carrier - (sun - carrier) * sun_teeth / planet_teeth)
 

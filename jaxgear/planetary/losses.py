@@ -105,7 +105,7 @@ def stage_efficiency(stage: PlanetaryStage, basic_efficiency: Given) -> Scalar:
         ValueError: for an efficiency that is not greater than zero and at most 1.
     """
     check("basic_efficiency", basic_efficiency, "", low=0.0, high=1.0, open_low=True)
-    basic = real(basic_efficiency)
+    basic = real(basic_efficiency).astype(stage.gears.module.dtype)
     speeds, ideal = member_speeds(stage, 1.0), member_torques(stage, 1.0)
     forward = ideal.of(stage.driving) * (speeds.sun - speeds.carrier) >= 0
     ratio = stage.gears.ring_teeth / stage.gears.sun_teeth * jnp.where(forward, basic, 1 / basic)

@@ -153,7 +153,8 @@ def stage_system(
     for member in _MEMBERS if not torsional else ():
         if getattr(stage, f"{member}_support") is not None and getattr(inertias, f"{member}_mass") is None:
             raise ValueError(f"inertias: {member}_mass is missing, the support of the {member} is not rigid")
-    return _assembled(stage, inertias, jnp.stack(stiffness), held, torsional)
+    bodies = jax.tree.map(lambda leaf: leaf.astype(dtype), inertias)
+    return _assembled(stage, bodies, jnp.stack(stiffness), held, torsional)
 
 
 class _Coordinate(NamedTuple):
