@@ -9,15 +9,19 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, PyTree
 
+from ..geometry import Gear, RingGear
 from ..geometry.outline import Outline
 from ..numerics import Checked, count, on_both
-from . import ring
+from . import rim, ring
 from .plane import Plane, plane_modulus, plane_poisson
 from .plate import axial_compliance
 from .tooth import ToothLoad
 
+Scalar = Float[Array, ""]
 Matrices = Float[Array, "planes pairs pairs positions"]
 Arcs = Float[Array, "planes pairs 3 3"]
+Rim = Float[Array, "planes pairs pairs 3 3"]
+Roots = tuple[Float[Array, "*planes pairs 3 3"], Float[Array, "*planes pairs pairs 3 3"] | None]
 
 
 class AbstractBody(Checked):
@@ -78,25 +82,50 @@ class ElasticRing(AbstractBody):
     coupling: bool = eqx.field(static=True, default=True)
     harmonics: int = count(high=100_000, default=400)
 
-    def of_gears(self, pinion: Outline, wheel: Outline, count: int, planes: tuple[Plane, ...]) -> tuple[Arcs, Arcs]:
-        return on_both(lambda outline: self._arcs(outline, count, planes), pinion, wheel)
+    def of_gears(self, pinion: Outline, wheel: Outline, count: int, planes: tuple[Plane, ...]) -> tuple[Roots, Roots]:
+        return on_both(lambda outline: self._roots(outline, count, planes), pinion, wheel)
 
     def of_both(
-        self, pinion: ToothLoad, wheel: ToothLoad, planes: tuple[Plane, ...], known: tuple[Arcs, Arcs] | None = None
+        self, pinion: ToothLoad, wheel: ToothLoad, planes: tuple[Plane, ...], known: tuple[Roots, Roots] | None = None
     ) -> tuple[Matrices, Matrices]:
         if known is None:
             known = self.of_gears(pinion.outline, wheel.outline, pinion.angle.shape[0], planes)
 
-        def of_one(given: tuple[ToothLoad, int | Array, Array]) -> Array:
-            load, step, arcs = given
+        def of_one(given: tuple[ToothLoad, int | Array, Roots]) -> Array:
+            load, step, roots = given
             modulus = jnp.stack([plane_modulus(load.outline.gear.material, plane) for plane in planes])
-            return jax.vmap(partial(self._between_teeth, load, step))(modulus, arcs)
+            return jax.vmap(partial(self._between_teeth, load, step))(modulus, roots)
 
         return on_both(of_one, (pinion, +1, known[0]), (wheel, step_of(wheel), known[1]))
 
     def compliance(self, load: ToothLoad, step: int, plane: Plane) -> Float[Array, "pairs pairs positions"]:
-        (arcs,) = self._arcs(load.outline, load.angle.shape[0], (plane,))
-        return self._between_teeth(load, step, plane_modulus(load.outline.gear.material, plane), arcs)
+        roots = jax.tree.map(lambda leaf: leaf[0], self._roots(load.outline, load.angle.shape[0], (plane,)))
+        return self._between_teeth(load, step, plane_modulus(load.outline.gear.material, plane), roots)
+
+    def _roots(self, outline: Outline, count: int, planes: tuple[Plane, ...]) -> Roots:
+        return self._arcs(outline, count, planes), self._by_supports(outline, count, planes)
+
+    def _by_supports(self, outline: Outline, count: int, planes: tuple[Plane, ...]) -> Rim | None:
+        """Between the root arcs of teeth, by what supports the rim of a ring gear; times the plane modulus."""
+        gear = outline.gear
+        if not isinstance(gear, RingGear) or gear.support is None:
+            return None
+        inner = -_rim_radius(gear)
+        # the loaded tooth of the reference pair is half a pitch before the middle of the space of its mate
+        behind = np.arange(count) - (count - 1) // 2 - 0.5
+
+        def in_plane(plane: Plane) -> Array:
+            modulus = plane_modulus(gear.material, plane)
+            return rim.support_compliance(
+                gear.signed(outline.root_half_angle),
+                inner / -gear.bore_radius,
+                plane_poisson(gear.material, plane),
+                behind * (2 * jnp.pi / gear.teeth),
+                gear.support,
+                rim.softness(gear.support, modulus, inner, gear.face_width),
+            )
+
+        return jnp.stack([in_plane(plane) for plane in planes])
 
     def _arcs(self, outline: Outline, count: int, planes: tuple[Plane, ...]) -> Arcs:
         """Between the root arc of a tooth and those of itself and its neighbours, times the plane modulus."""
@@ -110,14 +139,13 @@ class ElasticRing(AbstractBody):
         )(poisson)
 
     def _between_teeth(
-        self, load: ToothLoad, step: int | Array, modulus: Array, blocks: Float[Array, "pairs 3 3"]
+        self, load: ToothLoad, step: int | Array, modulus: Array, roots: Roots
     ) -> Float[Array, "pairs pairs positions"]:
         """`compliance` by what lies between the root arcs."""
+        blocks, by_supports = roots
         outline, count = load.outline, load.angle.shape[0]
         gear = outline.gear
-        arm = (load.height - outline.root_height) / gear.root_circle_radius
-        cosine = jnp.cos(load.angle)
-        modes = jnp.stack([-arm * cosine, cosine, -jnp.sin(load.angle)], axis=1)  # (pairs, 3, positions)
+        modes = _modes(load, gear.root_circle_radius)
         own = blocks[:1] - ring.relaxation(gear.signed(outline.root_half_angle))[None]
         blocks = jnp.concatenate([own, blocks[1:]])
         # the responding tooth i lies (i - j) steps from the loaded tooth j; K(-phi) = K(phi)^T
@@ -125,9 +153,12 @@ class ElasticRing(AbstractBody):
         both = jnp.stack([blocks, blocks.mT])
         between = both[(order < 0).astype(int), abs(order)]
         between = jnp.where(step > 0, between, between.mT)
-        if not self.coupling:
-            between = between * jnp.eye(count, dtype=between.dtype)[:, :, None, None]
         shape = jnp.einsum("iap,ijab,jbp->ijp", modes, between, modes)
+        if by_supports is not None:
+            modes = _modes(load, _rim_radius(gear))
+            shape = shape + jnp.einsum("iap,ijab,jbp->ijp", modes, by_supports, modes)
+        if not self.coupling:
+            shape = shape * jnp.eye(count, dtype=shape.dtype)[:, :, None]
         return 1e3 / modulus * shape
 
     def hub(self, outline: Outline) -> Float[Array, ""]:
@@ -148,3 +179,15 @@ class ElasticRing(AbstractBody):
         if gear.helix_angle is None or not self.hub_windup:
             return super().slope(outline)
         return axial_compliance(gear).slope
+
+
+def _rim_radius(gear: Gear) -> Scalar:
+    """Radius of the circle on which the teeth of a ring gear load the rim that its supports let bend [mm]."""
+    return gear.root_circle_radius + rim.STIFFENED * gear.module
+
+
+def _modes(load: ToothLoad, radius: Scalar) -> Float[Array, "pairs 3 positions"]:
+    """Moment, shear and compression of unit loads on the chord of the root arc at a radius."""
+    chord = load.outline.root_height / load.outline.gear.root_circle_radius * radius
+    arm, cosine = (load.height - chord) / radius, jnp.cos(load.angle)
+    return jnp.stack([-arm * cosine, cosine, -jnp.sin(load.angle)], axis=1)

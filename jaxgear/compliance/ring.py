@@ -13,6 +13,8 @@ References:
     P. Sainsot, P. Velex, O. Duverger, J. Mech. Des. 126 (2004) 748-752, doi 10.1115/1.1758252.
 """
 
+from typing import NamedTuple
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -52,7 +54,7 @@ def arc_compliance(
     uniform = _uniform_compliance(thickness_ratio, poisson)
     if internal:  # the outward normal of the loaded circle points to the axis: stresses are minus the tractions
         ring, uniform = -ring, -uniform
-    modes = _arc_modes(half_angle, harmonics)
+    modes = arc_modes(half_angle, harmonics)
     order = jnp.arange(1, harmonics + 1, dtype=modes.dtype)
     pairs = jnp.einsum("ani,nij,bnj->abn", modes[:, 1:], ring, modes[:, 1:])
     angle = order[None] * spacing[:, None]
@@ -91,7 +93,7 @@ def _uniform_compliance(thickness_ratio: Scalar, poisson: Scalar) -> Scalar:
     return (1 - poisson**2) * (1 - inner) / ((1 + poisson) + (1 - poisson) * inner)
 
 
-def _arc_modes(half_angle: Scalar, harmonics: int) -> Float[Array, "3 n 2"]:
+def arc_modes(half_angle: Scalar, harmonics: int) -> Float[Array, "3 n 2"]:
     """Fourier coefficients of the three load modes for unit resultants, n = 0 ... harmonics.
 
     The traction per arc length is the chord stress times cos(theta), turned into polar components. The second component
@@ -129,31 +131,47 @@ def _arc_modes(half_angle: Scalar, harmonics: int) -> Float[Array, "3 n 2"]:
 
 
 def _ring_compliance(thickness_ratio: Scalar, poisson: Scalar, harmonics: int, internal: bool) -> Float[Array, "n 2 2"]:
-    """Displacements (u_r, u_theta) of the root circle per stresses (sigma_r, tau) of harmonic n = 1 ... harmonics.
-
-    Four Michell terms per harmonic; those that decay from the bore to the root circle are scaled to their value at the
-    bore so that no power overflows. In an internal ring those are the terms that grow with the radius.
-    """
-    first = _first_harmonic(thickness_ratio, poisson)
-    if harmonics == 1:
-        return first
-    return jnp.concatenate([first, _higher_harmonics(thickness_ratio, poisson, harmonics, internal)])
+    """Displacements (u_r, u_theta) of the root circle per stresses (sigma_r, tau) of harmonic n = 1 ... harmonics."""
+    terms = michell_terms(thickness_ratio, poisson, harmonics, internal)
+    return jnp.concatenate([_condense(root, fixed, poisson) for root, fixed in terms])
 
 
-def _condense(bore: Array, outer_displacement: Array, outer_stress: Array, poisson: Array) -> Array:
-    """Eliminates the four term amplitudes: u = 0 at the bore, unit stresses outside; axes (harmonics, 2, 4)."""
-    system = jnp.concatenate([bore, outer_stress], axis=-2)
+def _condense(root: "Circle", fixed: "Circle", poisson: Array) -> Array:
+    """Eliminates the four term amplitudes: u = 0 on the fixed circle, unit stresses on the root circle."""
+    system = jnp.concatenate([fixed.displacement, root.stress], axis=-2)
     unit = jnp.zeros((*system.shape[:-1], 2), system.dtype).at[..., 2, 0].set(1.0).at[..., 3, 1].set(1.0)
     amplitude = jax.vmap(solve_dense)(system, unit)
-    return (1 + poisson) * (outer_displacement @ amplitude)  # 1 / (2 mu) = (1 + nu) / E
+    return (1 + poisson) * (root.displacement @ amplitude)  # 1 / (2 mu) = (1 + nu) / E
 
 
-def _higher_harmonics(thickness_ratio: Array, poisson: Array, harmonics: int, internal: bool) -> Array:
+class Circle(NamedTuple):
+    """Displacements (u_r, u_theta), times 2 mu, and stresses (sigma_r, tau) on a circle under unit amplitudes."""
+
+    displacement: Float[Array, "n 2 4"]
+    stress: Float[Array, "n 2 4"]
+
+
+def michell_terms(
+    thickness_ratio: Scalar, poisson: Scalar, harmonics: int, internal: bool
+) -> list[tuple[Circle, Circle]]:
+    """Michell's four terms of harmonic 1 and, if there are more, of all others, on root and fixed circle."""
+    first = _first_harmonic(thickness_ratio, poisson)
+    if harmonics == 1:
+        return [first]
+    return [first, _higher_harmonics(thickness_ratio, poisson, harmonics, internal)]
+
+
+def _higher_harmonics(
+    thickness_ratio: Array, poisson: Array, harmonics: int, internal: bool
+) -> tuple[Circle, Circle]:
+    """Terms that decay from the fixed circle to the root circle are scaled to their value at the fixed one, so that no
+    power overflows. In an internal ring those are the terms that grow with the radius.
+    """
     n = jnp.arange(2, harmonics + 1, dtype=thickness_ratio.dtype)
     kappa = (3 - poisson) / (1 + poisson)
-    inner = 1 / thickness_ratio
+    radius = 1 / thickness_ratio
     # of every term from one circle to the other, where it decays
-    fade = inner**-n if internal else inner**n
+    fade = radius**-n if internal else radius**n
     one = jnp.ones_like(n)
     displacement = jnp.stack(
         [
@@ -170,15 +188,15 @@ def _higher_harmonics(thickness_ratio: Array, poisson: Array, harmonics: int, in
         -2,
     )
     growing, decaying = (fade, one) if internal else (one, fade)
-    outer = jnp.stack([growing, decaying, growing, decaying], -1)[:, None]
-    bore = jnp.stack([decaying * inner, growing * inner, decaying / inner, growing / inner], -1)[:, None]
-    return _condense(displacement * bore, displacement * outer, stress * outer, poisson)
+    root = jnp.stack([growing, decaying, growing, decaying], -1)[:, None]
+    fixed = jnp.stack([decaying * radius, growing * radius, decaying / radius, growing / radius], -1)[:, None]
+    return Circle(displacement * root, stress * root), Circle(displacement * fixed, stress * fixed / radius)
 
 
-def _first_harmonic(thickness_ratio: Array, poisson: Array) -> Array:
+def _first_harmonic(thickness_ratio: Array, poisson: Array) -> tuple[Circle, Circle]:
     kappa = (3 - poisson) / (1 + poisson)
 
-    def columns(r: Array) -> tuple[Array, Array]:
+    def circle(r: Array) -> Circle:
         one, log = jnp.ones_like(r), jnp.log(r)
         displacement = jnp.stack(
             [
@@ -193,8 +211,6 @@ def _first_harmonic(thickness_ratio: Array, poisson: Array) -> Array:
                 jnp.stack([2 * r, -2 * r**-3, zero, -(kappa - 1) / r]),
             ]
         )
-        return displacement, stress
+        return Circle(displacement[None], stress[None])
 
-    outer_displacement, outer_stress = columns(jnp.ones_like(thickness_ratio))
-    bore, _ = columns(1 / thickness_ratio)
-    return _condense(bore[None], outer_displacement[None], outer_stress[None], poisson)
+    return circle(jnp.ones_like(thickness_ratio)), circle(1 / thickness_ratio)

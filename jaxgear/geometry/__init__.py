@@ -42,6 +42,9 @@ from .pair import pair_geometry as pair_geometry
 from .pair import path_of_contact as path_of_contact
 from .path import PathOfContact as PathOfContact
 from .path import reduced_radius as reduced_radius
+from .rim_support import AbstractRimSupport as AbstractRimSupport
+from .rim_support import ElasticFoundation as ElasticFoundation
+from .rim_support import SupportArcs as SupportArcs
 from .ring_gear import RingGear as RingGear
 from .thickness import Measures as Measures
 from .thickness import ToothThickness as ToothThickness

@@ -9,6 +9,7 @@ from jaxtyping import Array, Float
 
 from ..numerics import concrete, number, real
 from .gear import Gear, Shape
+from .rim_support import AbstractRimSupport
 
 Scalar = Float[Array, ""]
 Real = Float[Array, "*gears"]  # one number of each gear, where `jax.vmap` made many
@@ -41,8 +42,9 @@ class RingGear(Gear):
         cutter_profile_shift: profile shift coefficient x_0 of the cutter; 0 by default.
         tip_diameter: tip diameter d_a, less than the root diameter [mm]; None for the above.
         tip_form_diameter: tip form diameter d_Fa, at least the tip diameter [mm]; None for the tip diameter.
-        rim_diameter: outer diameter, at which the ring is held all round [mm]; None for the root diameter and seven
-            modules, a rim of 3.5 modules, which `str` prints.
+        rim_diameter: outer diameter, at which the ring is held [mm]; None for the root diameter and seven modules, a rim
+            of 3.5 modules, which `str` prints.
+        support: arcs or elastic foundation that hold the ring at its outer diameter; None for a rigid support all round.
 
     Raises:
         ValueError: as of `Gear`, for a tip diameter that does not lie between base and root diameter, or a rim
@@ -56,6 +58,7 @@ class RingGear(Gear):
 
     addendum: Scalar = number("x module", low=0.3, high=2.0, default=0.8, kw_only=True)
     rim_diameter: Scalar | None = number("mm", low=0.0, open_low=True, optional=True, default=None, kw_only=True)
+    support: AbstractRimSupport | None = eqx.field(default=None, kw_only=True)
     # of external gears
     protuberance: None = eqx.field(init=False, default_factory=type(None), repr=False)
     grinding_allowance: None = eqx.field(init=False, default_factory=type(None), repr=False)
