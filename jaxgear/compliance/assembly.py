@@ -103,6 +103,9 @@ class Compliance(AbstractCompliance):
     def __check_init__(self) -> None:
         check_plane_state(self.plane)
 
+    def check(self, pair: GearPair) -> None:
+        self.body.check(pair)
+
     def of_gears(self, pinion: Outline, wheel: Outline, count: int) -> AbstractCompliance:
         known = self.body.of_gears(pinion, wheel, count, structure_planes(self.plane))
         return self if known is None else _OfGears(model=self, known=known, plane=self.plane)

@@ -9,7 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, PyTree
 
-from ..geometry import Gear, RingGear
+from ..geometry import Gear, GearPair, RingGear
 from ..geometry.outline import Outline
 from ..numerics import Checked, count, on_both
 from . import rim, ring
@@ -26,6 +26,16 @@ Roots = tuple[Float[Array, "*planes pairs 3 3"], Float[Array, "*planes pairs pai
 
 class AbstractBody(Checked):
     """Compliance of the gear body between the teeth in contact."""
+
+    def check(self, pair: GearPair) -> None:
+        """Refuses a pair that the model does not hold for; by default a ring gear that is not held all round.
+
+        Raises:
+            ValueError: naming the gear and its field.
+        """
+        if isinstance(pair.wheel, RingGear) and pair.wheel.support is not None:
+            name = type(self).__name__
+            raise ValueError(f"RingGear: support must be None with the body {name}: ElasticRing alone knows supports")
 
     @abstractmethod
     def compliance(self, load: ToothLoad, step: int, plane: Plane) -> Float[Array, "pairs pairs positions"]:
@@ -102,6 +112,9 @@ class ElasticRing(AbstractBody):
         roots = jax.tree.map(lambda leaf: leaf[0], self._roots(load.outline, load.angle.shape[0], (plane,)))
         return self._between_teeth(load, step, plane_modulus(load.outline.gear.material, plane), roots)
 
+    def check(self, pair: GearPair) -> None:
+        """Accepts every pair."""
+
     def _roots(self, outline: Outline, count: int, planes: tuple[Plane, ...]) -> Roots:
         return self._arcs(outline, count, planes), self._by_supports(outline, count, planes)
 
@@ -120,7 +133,7 @@ class ElasticRing(AbstractBody):
                 gear.signed(outline.root_half_angle),
                 inner / -gear.bore_radius,
                 plane_poisson(gear.material, plane),
-                behind * (2 * jnp.pi / gear.teeth),
+                jnp.asarray(behind, modulus.dtype) * (2 * jnp.pi / gear.teeth),
                 gear.support,
                 rim.softness(gear.support, modulus, inner, gear.face_width),
             )

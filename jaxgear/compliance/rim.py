@@ -126,17 +126,15 @@ class _Segments(NamedTuple):
 
 
 def _segments(support: SupportArcs, harmonics: int) -> _Segments:
-    count = support.segments
+    count, reach = support.segments, 0.5 * jnp.deg2rad(support.width)
     edges = -np.cos(np.pi * np.arange(count + 1) / count)  # of an arc from -1 to 1
-    middle, half = 0.5 * (edges[1:] + edges[:-1]), 0.5 * np.diff(edges)
-    reach = 0.5 * jnp.deg2rad(support.width)
-    arcs = jnp.deg2rad(support.first + 360.0 / support.arcs * np.arange(support.arcs))
-    place = (arcs[:, None] + reach * middle).reshape(-1)
-    order = np.arange(harmonics + 1)
-    scale = np.where(order == 0, 1 / (2 * np.pi), 1 / np.pi)
-    density = jnp.sinc(order * (reach * half)[:, None] / np.pi) * scale
-    density = jnp.tile(density, (support.arcs, 1)).astype(reach.dtype)
-    none, share = jnp.zeros_like(density), jnp.tile(jnp.asarray(half, reach.dtype), support.arcs)
+    middle, half = (jnp.asarray(of, reach.dtype) for of in (0.5 * (edges[1:] + edges[:-1]), 0.5 * np.diff(edges)))
+    spacing = 2 * np.pi / support.arcs * jnp.arange(support.arcs, dtype=reach.dtype)
+    place = (jnp.deg2rad(support.first) + spacing[:, None] + reach * middle[None]).reshape(-1)
+    order = jnp.arange(harmonics + 1, dtype=reach.dtype)
+    scale = jnp.where(order == 0, 0.5, 1.0) / np.pi
+    density = jnp.tile(jnp.sinc(order[None] * (reach * half)[:, None] / np.pi) * scale[None], (support.arcs, 1))
+    none, share = jnp.zeros_like(density), jnp.tile(half, support.arcs)
     tangential = _loads(jnp.stack([none, -density], -1), place, np.zeros(len(place), bool))
     if not support.radial:
         return _Segments(tangential, share)
@@ -156,7 +154,7 @@ def _loads(series: Float[Array, "loads n 2"], place: Float[Array, " loads"], eve
         place: angles of the loads [rad].
         even: whether the radial force of a load is even about its place.
     """
-    angle = place[:, None] * jnp.arange(series.shape[1], dtype=place.dtype)
+    angle = place[:, None] * jnp.arange(series.shape[1], dtype=place.dtype)[None]
     cosine, sine = jnp.cos(angle), jnp.sin(angle)
     even = even[:, None]
     rows = jnp.stack([jnp.where(even, cosine, -sine), jnp.where(even, sine, cosine)], -1)
@@ -203,4 +201,4 @@ def _uniform(thickness_ratio: Scalar, poisson: Scalar) -> tuple[Circle, Circle]:
 
 def _inverse(matrix: Float[Array, "n 2 2"]) -> Float[Array, "n 2 2"]:
     (a, b), (c, d) = jnp.moveaxis(matrix, 0, -1)
-    return jnp.moveaxis(jnp.stack([jnp.stack([d, -b]), jnp.stack([-c, a])]) / (a * d - b * c), -1, 0)
+    return jnp.moveaxis(jnp.stack([jnp.stack([d, -b]), jnp.stack([-c, a])]) / (a * d - b * c)[None, None], -1, 0)

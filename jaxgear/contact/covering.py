@@ -31,7 +31,15 @@ def pairs_for(pair: GearPair, deflection: float | None) -> int:
     """Pairs to carry along where a resolution leaves their number open, see `prepare`."""
     if _is_traced(pair):
         return _PAIRS_TRACED
-    return fewest_pairs(pair, deflection=_contained(pair, deflection))
+    fewest = fewest_pairs(pair, deflection=_contained(pair, deflection))
+    return fewest + fewest % more_pairs(pair)
+
+
+def more_pairs(pair: GearPair) -> int:
+    """Pairs to add where more are needed: with one more, the mesh cycle begins half a base pitch earlier, which is
+    another place on a rim whose teeth are not supported alike.
+    """
+    return 1 if pair.wheel.alike else 2
 
 
 def _is_traced(pair: GearPair) -> bool:

@@ -27,7 +27,7 @@ from ..numerics import (
     tangent_stiffness,
 )
 from ..numerics.programs import begin
-from .covering import may_take_more
+from .covering import may_take_more, more_pairs
 from .cycle import MeshCycle
 from .face_coupling import check_torque, ends_together, holds_at
 from .mesh import Mesh, begin_mesh, resized
@@ -210,6 +210,21 @@ def check_mesh(mesh: object) -> None:
         raise TypeError(f"mesh is a {type(mesh).__name__}, must be a Mesh: jaxgear.prepare makes one")
 
 
+def check_alike(mesh: Mesh) -> None:
+    """Raise for a mesh whose cycles differ from each other, in what follows gears over more than one.
+
+    Raises:
+        TypeError: for something else than a prepared mesh.
+        ValueError: for a ring gear on arcs.
+    """
+    check_mesh(mesh)
+    if not mesh.pair.wheel.alike:
+        raise ValueError(
+            "RingGear: support: on arcs every mesh cycle differs from the one before: only single mesh cycles are "
+            "covered, for the rest hold the ring gear alike all round"
+        )
+
+
 def flanks_of(
     mesh: Mesh, pinion: AbstractModification | None, wheel: AbstractModification | None
 ) -> tuple[AbstractModification, AbstractModification]:
@@ -258,7 +273,7 @@ def wider_mesh(mesh: Mesh, status: Statuses) -> Mesh | None:
         return None
     if mesh.alternates:
         return replace(mesh, alternates=False)
-    return resized(mesh, pairs=mesh.resolution.chosen_pairs + 1)
+    return resized(mesh, pairs=mesh.resolution.chosen_pairs + more_pairs(mesh.pair))
 
 
 def more_pairs_help(mesh: Mesh, status: Statuses) -> bool:

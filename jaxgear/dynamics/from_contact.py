@@ -11,7 +11,7 @@ from jaxtyping import Array, Float
 from ..contact import Mesh
 from ..contact.mesh import resized
 from ..contact.operating_point import Torque, operating_point_of
-from ..contact.solve import check_mesh, more_pairs_help
+from ..contact.solve import check_alike, more_pairs_help
 from ..contact.status import Status, status_of
 from ..microgeometry import AbstractModification
 from ..numerics import Given, check, concrete, program, real, whole
@@ -97,7 +97,7 @@ def force_and_mesh(
     reach: Given = _REACH,
 ) -> tuple[AbstractMeshForce, Mesh]:
     """Mesh force as from `mesh_force`, and the mesh of its contact analyses."""
-    check_mesh(mesh)
+    check_alike(mesh)
     torque = operating_point_of(torque, mesh.slice_width.dtype).torque
     check("torque", torque, "N m", low=0.0, open_low=True)
     series = _number("compliance", compliance, "um/N", mesh, low=0.0)

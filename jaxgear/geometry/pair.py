@@ -151,10 +151,7 @@ class GearPair(Checked):
         coordinates. Its mesh positions run backwards in time: contact begins at the tip of the pinion, E, and ends at
         its root, A; approach and recess are exchanged.
         """
-        pinion, wheel = (
-            gear if gear.helix_angle is None else changed(gear, helix_angle=-gear.helix_angle) for gear in self.gears
-        )
-        return changed(self, pinion=pinion, wheel=wheel)
+        return changed(self, pinion=self.pinion.mirrored, wheel=self.wheel.mirrored)
 
     @property
     def is_spur(self) -> bool:

@@ -14,7 +14,7 @@ from jaxtyping import Array, Bool, Float
 from ..conditions import Design, Variants, call_with, conditions, solve_case, two_modifications
 from ..conditions.join import side_by_side
 from ..contact import Mesh, removed_material
-from ..contact.solve import check_mesh
+from ..contact.solve import check_alike
 from ..contact.status import Status
 from ..geometry import GearPair
 from ..numerics import Checked, check, program, result, solve_dense, whole
@@ -376,7 +376,7 @@ def _posed(
     single_pitch: Pitches | None,
     model_error: float,
 ) -> tuple[_Problem, Data]:
-    check_mesh(mesh)
+    check_alike(mesh)
     if not prior:
         raise ValueError("prior must name at least one unknown")
     every = dict(prior)

@@ -16,7 +16,7 @@ from ..contact import Kinematics, Mesh, MeshCycle, Resolution, solve_removed
 from ..contact.face_coupling import check_torque
 from ..contact.operating_point import OperatingPoint, Torque, operating_point_of
 from ..contact.slide import RemovedMaterial
-from ..contact.solve import check_mesh, flanks_of, material_of, outermost, wider_mesh
+from ..contact.solve import check_alike, flanks_of, material_of, outermost, wider_mesh
 from ..contact.status import Status, Statuses, WithStatus, status_of
 from ..geometry import Gear, Margins
 from ..microgeometry import AbstractModification, terms
@@ -142,7 +142,7 @@ def solve_revolution(
         TypeError: if the arguments are not a prepared mesh, settings of teeth or modifications.
         ValueError: for deviations of another number of teeth, and for all errors of `solve`.
     """
-    check_mesh(mesh)
+    check_alike(mesh)
     if not isinstance(teeth, Teeth):
         raise TypeError(f"teeth is a {type(teeth).__name__}, must be of Teeth")
     operating_point = operating_point_of(torque, mesh.slice_width.dtype)

@@ -19,7 +19,7 @@ from ..contact.face_coupling import check_torque
 from ..contact.operating_point import operating_point_of
 from ..contact.prescribed import solve_forces
 from ..contact.slide import slid_material
-from ..contact.solve import check_mesh, flanks_of
+from ..contact.solve import check_alike, flanks_of
 from ..contact.status import Status, Statuses, status_of
 from ..dynamics import Dynamics
 from ..dynamics.steady import SteadyForce
@@ -381,7 +381,7 @@ def case_of(
     line_load: LineLoad | None = None,
 ) -> Case:
     """Check the arguments of `wear` and collect them in a `Case`; raises the errors of `wear`."""
-    check_mesh(mesh)
+    check_alike(mesh)
     pinion, wheel = flanks_of(mesh, pinion, wheel)
     dtype = mesh.slice_width.dtype
     loads, weights = _loads(torque, dtype)
