@@ -1,8 +1,8 @@
 """Ring gears on arcs, bolts and elastic foundations.
 
-Reference values: plane finite elements of 19/64 teeth, module 3 mm, rims of three (R1) and one (R2) tooth height, on six
-rigid arcs of 6 degrees; the planet between two of them or at one. Mean and peak-to-peak value over the positions of the
-ring gear psi in [0, 1), from the contact of the reference pair at the pitch point on.
+Reference values: plane finite elements of 19/64 teeth, module 3 mm, rims of three (R1) and one (R2) tooth height, on
+six rigid arcs of 6 degrees; the planet between two of them or at one. Mean and peak-to-peak value over the positions
+of the ring gear psi in [0, 1), from the contact of the reference pair at the pitch point on.
 """
 
 import jax

@@ -121,7 +121,8 @@ class ElasticRing(AbstractBody):
     def _by_supports(self, outline: Outline, count: int, planes: tuple[Plane, ...]) -> Rim | None:
         """Between the root arcs of teeth, by what supports the rim of a ring gear; times the plane modulus."""
         gear = outline.gear
-        if not isinstance(gear, RingGear) or gear.support is None:
+        support = gear.support if isinstance(gear, RingGear) else None
+        if support is None:
             return None
         inner = -_rim_radius(gear)
         # the loaded tooth of the reference pair is half a pitch before the middle of the space of its mate
@@ -134,8 +135,8 @@ class ElasticRing(AbstractBody):
                 inner / -gear.bore_radius,
                 plane_poisson(gear.material, plane),
                 jnp.asarray(behind, modulus.dtype) * (2 * jnp.pi / gear.teeth),
-                gear.support,
-                rim.softness(gear.support, modulus, inner, gear.face_width),
+                support,
+                rim.softness(support, modulus, inner, gear.face_width),
             )
 
         return jnp.stack([in_plane(plane) for plane in planes])

@@ -42,7 +42,7 @@ def support_compliance(
     thickness_ratio: Scalar,
     poisson: Scalar,
     place: Float[Array, " teeth"],
-    support: SupportArcs | ElasticFoundation,
+    support: AbstractRimSupport,
     softness: Scalar,
 ) -> Float[Array, "teeth teeth 3 3"]:
     """Compliance between teeth by the supports, beyond that of a ring held all round.
@@ -61,27 +61,25 @@ def support_compliance(
     harmonics = support.harmonics
     teeth = _teeth(half_angle, place, harmonics)
     weight = np.pi * np.where(np.arange(harmonics + 1) == 0, 2.0, 1.0)
-    elastic = isinstance(support, ElasticFoundation)
-    springs = _foundation(1 / softness, harmonics) if elastic else _rigid_motions(teeth.dtype, harmonics)
+    arcs = support if isinstance(support, SupportArcs) else None
+    springs = _foundation(1 / softness, harmonics) if arcs is None else _rigid_motions(teeth.dtype, harmonics)
     of_ring = _ring(thickness_ratio, poisson, springs, harmonics)
     weighted = of_ring * jnp.asarray(weight, teeth.dtype)[:, None, None]
     between, outer = weighted[:, :2, 2:], weighted[:, 2:, 2:]
     moved = jnp.einsum("anpi,nij->anpj", teeth, between)
     found = jnp.einsum("anpi,nij,bnpj->ab", moved, _inverse(outer), moved)
-    if not elastic:
-        found = found - _reactions(teeth, moved, outer, support, softness, 1 / thickness_ratio)
+    if arcs is not None:
+        found = found - _reactions(teeth, moved, outer, arcs, softness, 1 / thickness_ratio)
     count = len(place)
     return jnp.transpose(found.reshape(count, 3, count, 3), (0, 2, 1, 3))
 
 
-def softness(
-    support: AbstractRimSupport, plane_modulus: Scalar, inner_radius: Scalar, face_width: Scalar
-) -> Scalar:
+def softness(support: AbstractRimSupport, plane_modulus: Scalar, inner_radius: Scalar, face_width: Scalar) -> Scalar:
     """Compliance of a support, times the plane modulus [MPa] and relative to inner radius and face width [mm]."""
-    if isinstance(support, ElasticFoundation):
-        return plane_modulus / (support.stiffness * inner_radius)
     if support.stiffness is None:
         return jnp.zeros_like(plane_modulus)
+    if isinstance(support, ElasticFoundation):
+        return plane_modulus / (support.stiffness * inner_radius)
     return 1e-3 * plane_modulus * face_width / support.stiffness
 
 

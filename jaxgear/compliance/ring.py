@@ -161,9 +161,7 @@ def michell_terms(
     return [first, _higher_harmonics(thickness_ratio, poisson, harmonics, internal)]
 
 
-def _higher_harmonics(
-    thickness_ratio: Array, poisson: Array, harmonics: int, internal: bool
-) -> tuple[Circle, Circle]:
+def _higher_harmonics(thickness_ratio: Array, poisson: Array, harmonics: int, internal: bool) -> tuple[Circle, Circle]:
     """Terms that decay from the fixed circle to the root circle are scaled to their value at the fixed one, so that no
     power overflows. In an internal ring those are the terms that grow with the radius.
     """

@@ -1,10 +1,8 @@
 """Supports of the rim of a ring gear."""
 
 from abc import abstractmethod
-from typing import ClassVar
 
 import equinox as eqx
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
@@ -20,7 +18,15 @@ _RESOLVED, _FEWEST_HARMONICS, _HARMONICS_TRACED = 2400, 400, 1200
 
 
 class AbstractRimSupport(Checked):
-    """Support of a ring gear on its outer circle, in place of one that is rigid all round."""
+    """Support of a ring gear on its outer circle, in place of one that is rigid all round.
+
+    Attributes:
+        stiffness: stiffness of the support; None for a rigid one.
+        harmonics: number of Fourier terms of the ring by which the support is resolved.
+    """
+
+    stiffness: eqx.AbstractVar[Scalar | None]
+    harmonics: eqx.AbstractVar[int]
 
     @property
     @abstractmethod
@@ -94,9 +100,11 @@ class ElasticFoundation(AbstractRimSupport):
         stiffness: traction per displacement k, in radial and in tangential direction [N/mm^3].
     """
 
-    harmonics: ClassVar[int] = _FEWEST_HARMONICS
-
     stiffness: Scalar = number("N/mm^3", low=0.0, open_low=True)
+
+    @property
+    def harmonics(self) -> int:
+        return _FEWEST_HARMONICS
 
     @property
     def alike(self) -> bool:

@@ -42,9 +42,10 @@ class RingGear(Gear):
         cutter_profile_shift: profile shift coefficient x_0 of the cutter; 0 by default.
         tip_diameter: tip diameter d_a, less than the root diameter [mm]; None for the above.
         tip_form_diameter: tip form diameter d_Fa, at least the tip diameter [mm]; None for the tip diameter.
-        rim_diameter: outer diameter, at which the ring is held [mm]; None for the root diameter and seven modules, a rim
-            of 3.5 modules, which `str` prints.
-        support: arcs or elastic foundation that hold the ring at its outer diameter; None for a rigid support all round.
+        rim_diameter: outer diameter, at which the ring is held [mm]; None for the root diameter and seven modules, a
+            rim of 3.5 modules, which `str` prints.
+        support: arcs or elastic foundation that hold the ring at its outer diameter; None for a rigid support all
+            round.
 
     Raises:
         ValueError: as of `Gear`, for a tip diameter that does not lie between base and root diameter, or a rim

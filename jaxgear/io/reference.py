@@ -13,7 +13,7 @@ import jax
 import numpy as np
 
 from ..compliance import AbstractBody, AbstractContact, AbstractTooth
-from ..geometry import Material
+from ..geometry import AbstractRimSupport, Material
 from ..microgeometry import AbstractCurve, AbstractModification
 from ..shafts import Misalignment
 from ..vocabulary import quantities
@@ -86,6 +86,7 @@ def _tables() -> Iterator[tuple[str, type[FileTable]]]:
     yield "The top level", file_section(further)
     yield "[pinion], [wheel] and [sun]", GearSection
     yield "[ring]", RingSection
+    yield from _types("support", AbstractRimSupport)
     yield "[planet]", PlanetSection
     yield "[materials.NAME], [pinion.material] and [wheel.material]", section_of(Material)
     yield "[pair]", PairSection
