@@ -101,10 +101,7 @@ class ElasticFoundation(AbstractRimSupport):
     """
 
     stiffness: Scalar = number("N/mm^3", low=0.0, open_low=True)
-
-    @property
-    def harmonics(self) -> int:
-        return _FEWEST_HARMONICS
+    harmonics: int = eqx.field(init=False, repr=False, static=True, default=_FEWEST_HARMONICS)
 
     @property
     def alike(self) -> bool:
