@@ -1,9 +1,9 @@
 """How far jaxgear is from finite elements: `python -m benchmarks.accuracy`.
 
 Compares the default model, the usual published model and the default with one ingredient changed with 76 finite-element
-mesh cycles (`reference/README.md`), then the load across the face and helical pairs with three-dimensional ones. Exit
-code 1 when an error of the default model has grown past `accuracy_bounds.json`, `face_bounds.json` or
-`helical_bounds.json`.
+mesh cycles (`reference/README.md`), internal pairs with 115 others, then the load across the face and helical pairs
+with three-dimensional ones. Exit code 1 when an error of the default model has grown past `accuracy_bounds.json`,
+`internal_bounds.json`, `face_bounds.json` or `helical_bounds.json`.
 """
 
 import jax
@@ -19,7 +19,7 @@ from pathlib import Path  # noqa: E402
 
 import numpy as np  # noqa: E402
 
-from . import face, helical  # noqa: E402
+from . import face, helical, internal  # noqa: E402
 from .cases import PAIRS, PLANES, Case, reference, select  # noqa: E402
 from .models import MODELS, Model, run  # noqa: E402
 from .quantities import QUANTITIES, errors  # noqa: E402
@@ -93,7 +93,9 @@ def _arguments(argv) -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.accuracy", description=__doc__.split("\n\n")[0])
     parser.add_argument("--cases", default=",".join(PAIRS), help="gear pairs, for example A,B (default: all)")
     parser.add_argument("--quick", action="store_true", help="default model, plane stress only, two dimensions")
-    parser.add_argument("--face", action="store_true", help="the load across the face and helical pairs alone")
+    parser.add_argument(
+        "--face", action="store_true", help="internal, helical pairs and the load across the face alone"
+    )
     parser.add_argument("--detail", action="store_true", help="one table per quantity with every case")
     parser.add_argument("--figures", metavar="DIR", type=Path, help="write the figures to this folder")
     parser.add_argument("--record", action="store_true", help="record the worst errors as the new bounds")
@@ -119,16 +121,19 @@ def main(argv: Sequence[str] | None = None, models: Sequence[Model] = MODELS, bo
 
 
 def _across(*, record: bool) -> list[str]:
-    """Compares the load across the face and helical pairs; one line for every error beyond its bound."""
-    results, inclined = face.compare(), helical.compare()
+    """Compares internal and helical pairs and the load across the face; one line for every error beyond its bound."""
+    inside, results, inclined = internal.compare(), face.compare(), helical.compare()
+    internal.print_internal(inside)
     face.print_face(results)
     helical.print_helical(inclined)
     if record:
         face.record(results["coupled"])
         helical.record(inclined)
-        print(f"recorded {face.BOUNDS}, {helical.BOUNDS}")
+        internal.record(inside)
+        print(f"recorded {internal.BOUNDS}, {face.BOUNDS}, {helical.BOUNDS}")
         return []
-    return face.exceeded(results["coupled"], face.load_bounds()) + helical.exceeded(inclined)
+    across = face.exceeded(results["coupled"], face.load_bounds()) + helical.exceeded(inclined)
+    return internal.exceeded(inside) + across
 
 
 def _sections(arguments: argparse.Namespace, models: Sequence[Model], bounds: Path) -> list[str]:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import jaxgear as jg
-from benchmarks import accuracy, cases, face, goals, helical, models, quantities, report
+from benchmarks import accuracy, cases, face, goals, helical, internal, models, quantities, report
 
 CASE = cases.Case("A", "strain", 50.0, "par7.81x5.05")
 OTHER = cases.Case("L", "stress", 100.0, "linshort")
@@ -251,3 +251,28 @@ def test_errors_of_helical_pairs_are_held_to_their_bounds():
     for bad in (-50.0, float("nan")):
         grown = {**results, worst: replace(results[worst], ripple=bad)}
         assert [line.split()[:3] for line in helical.exceeded(grown)] == [[*worst.split(), "ripple:"]]
+
+
+def test_errors_of_internal_pairs_are_held_to_their_bounds():
+    """The reference itself has none, but for positions half a transmission error off; grown ones are told."""
+    results = {}
+    for name, data in internal.stored()["pairs"].items():
+        for group, curves in data["curves"].items():
+            for key, curve in curves.items():
+                found = internal.errors(np.asarray(curve), np.arange(64) / 64, np.asarray(curve), 1e9)
+                results.setdefault(f"{name} {group}", {})[key] = found
+    assert sum(map(len, results.values())) == 115
+    assert max(value for *_, value in internal._values(results)) < 1e-4
+    assert internal.exceeded(results) == []
+    worst = next(iter(results))
+    for bad in (-5.0, float("nan")):
+        grown = {**results, worst: {"one": replace(found, mean=bad)}}
+        assert [line.split()[:4] for line in internal.exceeded(grown)] == [[*worst.split(), "mean:"]]
+
+
+@pytest.mark.slow
+def test_internal_pairs_are_within_their_bounds(capsys):
+    results = {"R2 six_at stress": internal.run("R2", "six_at stress")}
+    assert internal.exceeded(results) == []
+    internal.print_internal(results)
+    assert "0 of 10 cycles" in capsys.readouterr().out
