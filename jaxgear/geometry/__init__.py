@@ -18,6 +18,10 @@ Coordinates and signs used everywhere:
 
 from . import material as _material
 from .backlash import pair_with_backlash as pair_with_backlash
+from .bevel import BevelPair as BevelPair
+from .bevel import VirtualGear as VirtualGear
+from .bevel import virtual_load as virtual_load
+from .bevel import virtual_pair as virtual_pair
 from .drawing import ToothProfile as ToothProfile
 from .drawing import drawn_gear as drawn_gear
 from .drawing import with_profile as with_profile
