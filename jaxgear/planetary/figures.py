@@ -11,6 +11,7 @@ from ..plot.figure import GREY, PALE, captioned, legend_above, line_style, repor
 from ..plot.mesh_cycle import PHASE_LABEL, two_pitches
 from .cycle import StageCycle
 from .kinematics import phasing, planet_phases
+from .response import StageResponse
 from .stage import PlanetaryStage
 
 _SIZE = 95.0  # of the drawing of a stage [mm]
@@ -151,6 +152,27 @@ def orbit(cycles: Mapping[str, StageCycle], ax: Axes | None = None) -> Axes:
         ax.plot(0, 0, marker="+", color=GREY, markersize=7)
         ax.set(xlabel="x of the sun [µm]", ylabel="y of the sun [µm]")
         ax.set_aspect("equal", adjustable="datalim")
+        legend_above(ax)
+    return ax
+
+
+@captioned("Largest force of a mesh over the mean of all, linear vibration; dotted where a mesh would lose contact.")
+def dynamic_factors(responses: Mapping[str, StageResponse], ax: Axes | None = None) -> Axes:
+    """Dynamic factor of a stage over the mesh frequency.
+
+    Args:
+        responses: vibration by the name of the design.
+        ax: Axes to draw into; None for a new figure.
+    """
+    with report_axes(ax) as ax:
+        for index, name, response in styled(responses):
+            frequency, factor = (np.asarray(each) for each in (response.mesh_frequency, response.dynamic_factor))
+            held = ~np.asarray(response.loses_contact)
+            style = line_style(index)
+            ax.plot(1e-3 * frequency, np.where(held, factor, np.nan), label=name, **style)
+            ax.plot(1e-3 * frequency, factor, **{**style, "linestyle": ":", "linewidth": 0.8})
+        ax.set(xlabel="mesh frequency [kHz]", ylabel="dynamic factor of the meshes [-]")
+        ax.set_ylim(bottom=1.0)
         legend_above(ax)
     return ax
 

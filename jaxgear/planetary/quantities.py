@@ -21,11 +21,15 @@ from .flanks import of_design
 from .kinematics import driving_torque, member_speeds
 from .losses import StageLosses, stage_losses
 from .mesh_cycles import StageMeshes, mesh_cycles
+from .response import StageResponse, stage_response
 from .solve import PreparedStage, solve_stage
 from .stage import PlanetaryStage
+from .vibration import StageInertias, StageSystem, stage_system
 
 Scalar = Float[Array, ""]
 
+_MINUTE = 60.0  # s
+_DAMPING = 0.05  # of gears with splash lubrication, 0.03 to 0.1
 _LEVEL = 0.95  # of the stages with errors that are no worse than a quantity with errors says
 
 
@@ -45,6 +49,8 @@ class StageSettings(AbstractSettings):
         pin_errors: tangential displacements of the pins of many stages, in addition to those of the stage, shape
             (samples, planets); None for the stage alone.
         lubricant: lubricant, for losses; None where the load has a coefficient of friction.
+        inertias: inertias of all members, for vibration; None for none.
+        damping_ratio: damping ratio of its modes.
     """
 
     table: ClassVar[str] = "stage"
@@ -54,6 +60,8 @@ class StageSettings(AbstractSettings):
         "um", shape=("samples", "planets"), optional=True, default=None
     )
     lubricant: Lubricant | None = None
+    inertias: StageInertias | None = None
+    damping_ratio: Scalar = number("", low=0.0, high=1.0, default=_DAMPING)
 
     def check_together(self) -> None:
         planets = self.prepared.stage.planets
@@ -78,6 +86,35 @@ class StageSettings(AbstractSettings):
         """Losses of the flanks of all meshes with the flanks and at torque and speed of an analysis."""
         cycle, meshes = self.solve(analysis), self.contacts(analysis)
         return analysis.once(self, "losses", lambda: stage_losses(cycle, meshes, self.lubricant))
+
+    def system(self, meshes: StageMeshes) -> StageSystem:
+        """Masses and springs of the stage with meshes of their mean stiffness.
+
+        Raises:
+            ValueError: without `inertias`.
+        """
+        if self.inertias is None:
+            raise ValueError("needs inertias of the StageSettings")
+        stiffness = meshes.mean_stiffness
+        stage, inertias = self.prepared.stage, self.inertias
+        return stage_system(stage, inertias, sun_stiffness=stiffness.sun, ring_stiffness=stiffness.ring)
+
+    def response(self, analysis: Analysis) -> StageResponse:
+        """Linear vibration at the speed of an analysis, with its flanks and torque.
+
+        Raises:
+            ValueError: without `inertias`, and without a speed.
+        """
+        speed = analysis.operating_point.speed
+        if speed is None:
+            raise ValueError("needs a speed of the operating point")
+        frequency = self.prepared.stage.gears.sun_teeth * speed / _MINUTE
+
+        def found() -> StageResponse:
+            system = self.system(self.contacts(analysis))
+            return stage_response(system, self.solve(analysis), frequency[None], damping_ratio=self.damping_ratio)
+
+        return analysis.once(self, "response", found)
 
     def solve_with_errors(self, analysis: Analysis) -> StageCycle:
         """The stages with pin errors, with an axis (samples,) in front.
@@ -124,6 +161,11 @@ def _of_contacts(of: Callable[[StageMeshes], Scalar], analysis: Analysis, settin
 
 def _of_losses(of: Callable[[StageLosses], Scalar], analysis: Analysis, settings: StageSettings) -> Scalar:
     return jnp.where(jnp.all(settings.solve(analysis).converged), of(settings.losses(analysis)), jnp.nan)
+
+
+def _dynamic_factor(analysis: Analysis, settings: StageSettings) -> Scalar:
+    fine = jnp.all(settings.solve(analysis).converged)
+    return jnp.where(fine, settings.response(analysis).dynamic_factor[0], jnp.nan)
 
 
 def _with_errors(of: Callable[[StageCycle], Scalar], analysis: Analysis, settings: StageSettings) -> Scalar:
@@ -205,6 +247,7 @@ OF_LOSSES: dict[str, tuple[Callable[[StageLosses], Scalar], str, str, Literal["s
     ),
     "stage_loss_power": (lambda losses: losses.loss_power, "W", "power that the flanks of the stage lose", "smaller"),
 }
+DYNAMIC_FACTOR = "stage_dynamic_factor"
 WITH_ERRORS = "_with_pin_errors"
 _ROBUST = "stage_ppte", "load_sharing_factor", "peak_load_sharing_factor", "max_pin_force"
 _FORMS = {"N": ".0f", "MPa": ".0f"}
@@ -221,6 +264,12 @@ STAGE_QUANTITIES = Vocabulary(
         *(
             replace(_quantity(name, partial(_of_losses, of), unit, meaning), better=better)
             for name, (of, unit, meaning, better) in OF_LOSSES.items()
+        ),
+        _quantity(
+            DYNAMIC_FACTOR,
+            _dynamic_factor,
+            "",
+            "largest force of a mesh over the mean of all meshes, linear vibration at the speed of the load",
         ),
         *(
             _quantity(

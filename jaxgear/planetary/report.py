@@ -10,8 +10,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from ..metrics import Lubricant, peak_to_peak
-from ..numerics import program
+from ..metrics import peak_to_peak
+from ..numerics import program, real
 from ..report import Chapter, Figure, Part, Record, Table, numbers_of, table_of
 from .cycle import StageCycle
 from .kinematics import (
@@ -26,8 +26,11 @@ from .kinematics import (
 from .losses import StageLosses, stage_losses
 from .mesh_cycles import StageMeshes, mesh_cycles
 from .meshes import StageFlanks
+from .quantities import StageSettings
+from .response import stage_response
 from .solve import PreparedStage, solve_stage
 from .stage import PlanetaryStage
+from .vibration import StageModes, natural_modes
 
 _ORDERS = 6
 _MEMBERS = "sun", "ring", "carrier"
@@ -96,25 +99,33 @@ def stages_over_torques(
 
 
 def part(
-    prepared: PreparedStage,
+    settings: StageSettings,
     over_torques: Mapping[str, StageCycle],
     speed: float | None,
     friction: float | None = None,
-    lubricant: Lubricant | None = None,
 ) -> Part:
     """The stage under load with the flanks of several designs, for the terminal, the report and the files.
 
     Args:
-        prepared: prepared stage.
+        settings: the stage.
         over_torques: cycles of one stage under several torques by the name of their design, with an axis (torques,) in
             front: under the design torque, then over a range. The last one is the design of the report.
         speed: speed of the driving member [rpm]; None for none.
         friction: mean coefficient of friction; None for that of the lubricant, if there is one.
-        lubricant: lubricant; None for none.
     """
+    prepared, lubricant = settings.prepared, settings.lubricant
     cycles = {name: jax.tree.map(lambda leaf: leaf[0], each) for name, each in over_torques.items()}
     name, cycle = list(cycles.items())[-1]
     meshes = {name: mesh_cycles(prepared, each, speed=speed, friction=friction) for name, each in cycles.items()}
+    modes, responses = None, {}
+    if settings.inertias is not None:
+        systems = {name: settings.system(each) for name, each in meshes.items()}
+        modes = natural_modes(systems[name])
+        frequencies = real(np.linspace(*_FREQUENCIES, _MANY) * float(modes.frequency[-1]))
+        responses = {
+            name: stage_response(system, cycles[name], frequencies, damping_ratio=settings.damping_ratio)
+            for name, system in systems.items()
+        }
     of_losses = {}
     if speed is not None and (lubricant is not None or friction is not None):
         of_losses = {name: stage_losses(each, meshes[name], lubricant) for name, each in cycles.items()}
@@ -125,14 +136,17 @@ def part(
             table_of(_OF_MESHES, meshes, "Meshes of the stage", "largest over planets", across=True),
             _over_torques(over_torques),
         ),
-        chapters=tuple(_chapters(name, cycles, speed)),
+        chapters=(*_chapters(name, cycles, speed), *_vibration(modes)),
         data={
             name: {**numbers_of(_NUMBERS, each), **numbers_of(_OF_MESHES, meshes[name]), **_lists(each)}
             | (numbers_of(_OF_LOSSES, of_losses[name]) if of_losses else {})
             for name, each in cycles.items()
         },
         lines=tuple(_lines(cycles)),
-        figures=tuple(partial(_drawn, name, cycles) for name in _FIGURES),
+        figures=(
+            *(partial(_drawn, name, cycles) for name in _FIGURES),
+            *([partial(_drawn, "dynamic_factors", responses)] if responses else []),
+        ),
     )
 
 
@@ -225,6 +239,25 @@ def _planets(cycle: StageCycle) -> Table:
     return table
 
 
+def _vibration(modes: StageModes | None) -> Iterator[Chapter]:
+    if modes is None:
+        return
+    table = Table(("mode", "frequency [Hz]", "kind"), (), "Natural frequencies", "of the last design, carrier at rest")
+    for number, (frequency, kind) in enumerate(zip(np.asarray(modes.frequency), modes.kinds)):
+        table.add_row(str(number + 1), f"{frequency:.5g}", _KINDS[kind])
+    yield Chapter("Vibration of the stage", (_LINEAR,), tables=[table])
+
+
+_KINDS = {
+    "rotation": "members turn, all planets alike",
+    "translation": "centres of members move",
+    "planet": "planets alone",
+}
+_LINEAR = (
+    "Linear vibration about the loaded state: meshes of their mean stiffness, excited by their loaded transmission "
+    "errors. Where a mesh would lose contact it does not hold."
+)
+_FREQUENCIES, _MANY = (0.02, 1.1), 400  # mesh frequencies over the highest natural frequency
 _PLANET_FORMS = ".3f", ".4f", ".4f", ".4f", ".0f"
 
 
@@ -241,10 +274,12 @@ def _orders(cycles: Mapping[str, StageCycle]) -> Table:
 _FIGURES = "stage_drawing", "transmission_error", "load_shares", "orders", "orbit"
 
 
-def _drawn(name: str, cycles: Mapping[str, StageCycle]) -> Figure:
+def _drawn(name: str, results: Mapping[str, Any]) -> Figure:
     from . import figures  # imports matplotlib
 
-    last = list(cycles.values())[-1]
-    of = {"stage_drawing": last.stage, "load_shares": last}.get(name, cycles)
+    of: Any = results
+    if name in ("stage_drawing", "load_shares"):
+        last = list(results.values())[-1]
+        of = last.stage if name == "stage_drawing" else last
     found = Figure.of(getattr(figures, name), of)
     return replace(found, name=name if name.startswith("stage") else f"stage_{name}")

@@ -15,19 +15,21 @@ from ..io.design_file import DesignFile, FileDesign, design_of
 from ..io.errors import DesignFileError, calling, join, refused
 from ..io.table_keys import entry, section_of, template_of
 from ..io.tables import FurtherTable
-from ..io.value_types import SEED, count, positive
+from ..io.value_types import SEED, count, positive, real
 from ..metrics import Quantity
 from ..microgeometry import AbstractModification, NoModification
-from ..numerics import real
+from ..numerics import Number, changed
+from ..numerics import real as as_real
 from ..report import Part
 from ..tolerance import TruncatedNormal
 from .flanks import PlanetFlanks, of_design
 from .gears import StageGears
 from .kinematics import driving_torque, mesh_frequency
-from .quantities import OF_LOSSES, WITH_ERRORS, StageSettings
+from .quantities import DYNAMIC_FACTOR, OF_LOSSES, WITH_ERRORS, StageSettings
 from .report import part, stages_over_torques
 from .solve import prepare_stage
 from .stage import PlanetaryStage
+from .vibration import StageInertias
 
 _GEARS = "sun", "planet", "ring"
 _FLANKS = "modification", "ring_modification"
@@ -70,6 +72,10 @@ class StageSection(FurtherTable, section_of(PlanetaryStage, ("gears",), open=Fal
             quantities with pin errors.
         pin_samples: number of stages with such errors.
         seed: seed of the errors.
+        carrier_inertia: moment of inertia of the carrier without the planets, for natural frequencies and vibration;
+            those of the gears are of their bodies.
+        carrier_mass: mass of the carrier, for a carrier whose support is not rigid.
+        damping_ratio: damping ratio of the modes; 0.05 without it.
     """
 
     table = "stage"
@@ -79,6 +85,9 @@ class StageSection(FurtherTable, section_of(PlanetaryStage, ("gears",), open=Fal
     pin_tolerance: float | None = entry(positive("um"))
     pin_samples: int = entry(count(2, _MOST_SAMPLES), _SAMPLES)
     seed: int = entry(SEED, 0)
+    carrier_inertia: float | None = entry(positive("kg m2"))
+    carrier_mass: float | None = entry(positive("kg"))
+    damping_ratio: float | None = entry(real(Number("", low=0.0, high=1.0)))
     _outer: DesignFile
     _torque: float  # on the driving member, as are range and speed
     _torques: tuple[float, float]
@@ -140,7 +149,7 @@ class StageSection(FurtherTable, section_of(PlanetaryStage, ("gears",), open=Fal
         speed = None
         if design.speed is not None:
             speed = float(60 * mesh_frequency(stage, design.speed) / sun_teeth)
-        load: Any = {"torque": real(share * design.torque)} | ({} if speed is None else {"speed": real(speed)})
+        load: Any = {"torque": as_real(share * design.torque)} | ({} if speed is None else {"speed": as_real(speed)})
         low, high = design.torque_range
         self._outer, self._speed = outer, design.speed
         self._torque, self._torques = design.torque, design.torque_range
@@ -169,11 +178,21 @@ class StageSection(FurtherTable, section_of(PlanetaryStage, ("gears",), open=Fal
         for name, section in (("pin_samples", self.pin_samples), ("seed", self.seed)):
             if name in self.fields and self.pin_tolerance is None:
                 raise DesignFileError(join(self.key, name), f"{section} has no effect without stage.pin_tolerance")
+        for name in ("carrier_mass", "damping_ratio"):
+            if name in self.fields and self.carrier_inertia is None:
+                raise DesignFileError(join(self.key, name), "has no effect without stage.carrier_inertia")
+        if self.carrier_inertia is not None and self.carrier_support is not None and self.carrier_mass is None:
+            raise DesignFileError("stage.carrier_mass", "missing, the support of the carrier is not rigid")
 
     def quantity(self, design: DesignFile, key: str, quantity: Quantity) -> Quantity:
         """A quantity of the stage."""
         if quantity.name.endswith(WITH_ERRORS) and self.pin_tolerance is None:
             raise DesignFileError(key, f'"{quantity.name}" needs stage.pin_tolerance')
+        if quantity.name == DYNAMIC_FACTOR:
+            if self.carrier_inertia is None:
+                raise DesignFileError(key, f'"{quantity.name}" needs stage.carrier_inertia')
+            if design.speed is None:
+                raise DesignFileError(key, f'"{quantity.name}" needs load.speed')
         if quantity.name in OF_LOSSES:
             if design.speed is None:
                 raise DesignFileError(key, f'"{quantity.name}" needs load.speed')
@@ -192,24 +211,34 @@ class StageSection(FurtherTable, section_of(PlanetaryStage, ("gears",), open=Fal
             sizes = each.resolution()
             meshes[name] = each.mesh(replace(sizes, positions=step * -(-sizes.positions // step)))
         lubricant = design.tables.get("lubricant")
-        made = StageSettings(prepare_stage(stage, **meshes), self._pin_errors(stage.planets), lubricant)
+        made = StageSettings(
+            prepare_stage(stage, **meshes), self._pin_errors(stage.planets), lubricant, self._inertias(design)
+        )
+        if self.damping_ratio is not None:
+            made = changed(made, damping_ratio=as_real(self.damping_ratio))
         self._made = design, made
         return made
+
+    def _inertias(self, design: DesignFile) -> StageInertias | None:
+        if self.carrier_inertia is None:
+            return None
+        gears = (*design.pair().gears, self._outer.pair().wheel)
+        return StageInertias.of_gears(*gears, carrier=self.carrier_inertia, carrier_mass=self.carrier_mass)
 
     def _pin_errors(self, planets: int) -> Float[Array, "samples planets"] | None:
         if self.pin_tolerance is None:
             return None
         key, shape = jax.random.key(self.seed), (self.pin_samples, planets)
-        return self.pin_tolerance * TruncatedNormal()(key, shape, real(0.0).dtype)
+        return self.pin_tolerance * TruncatedNormal()(key, shape, as_real(0.0).dtype)
 
     def part(self, design: DesignFile, name: str, cycle: MeshCycle) -> Part:
         """The stage with the flanks of a design, for the terminal, the report and the files."""
         settings, (low, high) = self.settings(design), self._torques
         torques = np.concatenate([[self._torque], np.linspace(low, high, _TORQUES)])
         flanks = of_design(cycle.pinion, cycle.wheel)
-        unmodified, modified = stages_over_torques(settings.prepared, real(torques), flanks)
+        unmodified, modified = stages_over_torques(settings.prepared, as_real(torques), flanks)
         cycles = {"unmodified": unmodified, name: modified}
-        return part(settings.prepared, cycles, self._speed, design.friction, settings.lubricant)
+        return part(settings, cycles, self._speed, design.friction)
 
 
 def _names(content: object) -> set[str]:
