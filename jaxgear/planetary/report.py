@@ -133,6 +133,7 @@ def part(
     return Part(
         tables=(
             numbers,
+            *([table_of(_OF_LOSSES, of_losses, "Losses of the flanks", across=True)] if of_losses else []),
             table_of(_OF_MESHES, meshes, "Meshes of the stage", "largest over planets", across=True),
             _over_torques(over_torques),
         ),
