@@ -181,3 +181,14 @@ def test_losses_of_a_stage_need_speed_and_friction(tmp_path):
         quantity_named(without, "of", "stage_efficiency")
     with pytest.raises(DesignFileError, match=r"needs load\.friction or the table \[lubricant\]"):
         quantity_named(load(tmp_path, BARE), "of", "stage_efficiency")
+
+
+def test_vibration_of_a_stage_needs_the_inertia_of_its_carrier(tmp_path):
+    """What a carrier alone has is refused without it, and so is the quantity."""
+    with pytest.raises(DesignFileError, match=r'"stage_dynamic_factor" needs stage\.carrier_inertia'):
+        quantity_named(load(tmp_path, BARE), "of", "stage_dynamic_factor")
+    with pytest.raises(DesignFileError, match=r"stage\.damping_ratio: has no effect without stage\.carrier_inertia"):
+        load(tmp_path, BARE.replace("planets = 4", "planets = 4\ndamping_ratio = 0.1"))
+    soft = "planets = 4\ncarrier_support = 100.0\ncarrier_inertia = 0.1"
+    with pytest.raises(DesignFileError, match=r"stage\.carrier_mass: missing"):
+        load(tmp_path, BARE.replace("planets = 4", soft))
