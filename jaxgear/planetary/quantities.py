@@ -7,7 +7,7 @@ stage besides: `StageSettings.quantity` supplies it in Python, the table [stage]
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -16,6 +16,7 @@ from jaxtyping import Array, Float
 from ..contact.status import Status
 from ..metrics import AbstractSettings, Analysis, Lubricant, Quantity, Vocabulary, peak_to_peak
 from ..numerics import Quantile, maximum, number, real
+from ..numerics.reductions import AbstractReduction, Max, Range, Value
 from .cycle import StageCycle
 from .flanks import of_design
 from .kinematics import driving_torque, member_speeds
@@ -148,7 +149,7 @@ def _relative_speed(stage: PlanetaryStage) -> Scalar:
     return jnp.abs(unit.sun - unit.carrier)
 
 
-def _number(of: Callable[[StageCycle], Scalar], analysis: Analysis, settings: StageSettings) -> Scalar:
+def _values(of: Callable[[StageCycle], Array], analysis: Analysis, settings: StageSettings) -> Float[Array, "..."]:
     cycle = settings.solve(analysis)
     return jnp.where(jnp.all(cycle.converged), of(cycle), jnp.nan)
 
@@ -168,9 +169,9 @@ def _dynamic_factor(analysis: Analysis, settings: StageSettings) -> Scalar:
     return jnp.where(fine, settings.response(analysis).dynamic_factor[0], jnp.nan)
 
 
-def _with_errors(of: Callable[[StageCycle], Scalar], analysis: Analysis, settings: StageSettings) -> Scalar:
-    cycles = settings.solve_with_errors(analysis)
-    values = jax.vmap(of)(cycles)
+def _with_errors(name: str, analysis: Analysis, settings: StageSettings) -> Scalar:
+    cycles, own = settings.solve_with_errors(analysis), OF_STAGE[name]
+    values = jax.vmap(lambda cycle: own.reduction(own.of(cycle).ravel()))(cycles)
     alike = jnp.ones_like(values) / len(values)
     fine = jnp.all(cycles.converged)
     return jnp.where(fine, Quantile(real(_LEVEL))(values, alike), jnp.nan)
@@ -182,44 +183,66 @@ def _order(number: int, cycle: StageCycle) -> Scalar:
 
 _ORDERS = 3
 
-# of a stage: its function, unit, meaning
-OF_STAGE: dict[str, tuple[Callable[[StageCycle], Scalar], str, str]] = {
-    "stage_ppte": (
-        lambda cycle: peak_to_peak(cycle.transmission_error),
+Curves = Float[Array, "..."]
+
+
+class _OfCycle(NamedTuple):
+    """A number of a stage: values and what makes one of them, unit and meaning."""
+
+    of: Callable[[StageCycle], Curves]
+    reduction: AbstractReduction
+    unit: str
+    meaning: str
+
+
+OF_STAGE = {
+    "stage_ppte": _OfCycle(
+        lambda cycle: cycle.transmission_error,
+        Range(),
         "um",
         "transmission error of the stage on the base circle of the sun, peak to peak",
     ),
-    "mean_stage_transmission_error": (
+    "mean_stage_transmission_error": _OfCycle(
         lambda cycle: jnp.mean(cycle.transmission_error),
+        Value(),
         "um",
         "transmission error of the stage on the base circle of the sun, mean",
     ),
     **{
-        f"stage_mesh_order_{order}": (
+        f"stage_mesh_order_{order}": _OfCycle(
             partial(_order, order),
+            Value(),
             "um",
             f"transmission error of the stage at {order} times the mesh frequency, amplitude",
         )
         for order in range(1, _ORDERS + 1)
     },
-    "load_sharing_factor": (
-        lambda cycle: cycle.load_sharing_factor,
+    "load_sharing_factor": _OfCycle(
+        lambda cycle: cycle.mean_load_share,
+        Max(),
         "",
         "load sharing factor K_gamma: largest mean load of a planet over the mean of all",
     ),
-    "peak_load_sharing_factor": (
-        lambda cycle: cycle.peak_load_sharing_factor,
+    "peak_load_sharing_factor": _OfCycle(
+        lambda cycle: maximum(cycle.load_share, -2),
+        Max(),
         "",
         "largest load of a planet at any position over the mean of all",
     ),
-    "sun_orbit": (lambda cycle: cycle.orbit, "um", "largest distance of the sun's centre from its mean place"),
-    "max_pin_force": (lambda cycle: maximum(cycle.pin_force), "N", "largest force of a planet on its pin"),
-    "pin_force_excitation": (
-        lambda cycle: maximum(jax.vmap(peak_to_peak)(cycle.pin_force)),
+    "sun_orbit": _OfCycle(
+        lambda cycle: cycle.orbit, Value(), "um", "largest distance of the sun's centre from its mean place"
+    ),
+    "max_pin_force": _OfCycle(
+        lambda cycle: maximum(cycle.pin_force, -2), Max(), "N", "largest force of a planet on its pin"
+    ),
+    "pin_force_excitation": _OfCycle(
+        lambda cycle: jax.vmap(peak_to_peak)(cycle.pin_force),
+        Max(),
         "N",
         "force of a planet on its pin, largest peak to peak",
     ),
 }
+
 # of the contacts of all its meshes, in MPa
 OF_CONTACTS: dict[str, tuple[Callable[[StageMeshes], Scalar], str]] = {
     "max_stage_flank_pressure": (
@@ -253,16 +276,19 @@ _ROBUST = "stage_ppte", "load_sharing_factor", "peak_load_sharing_factor", "max_
 _FORMS = {"N": ".0f", "MPa": ".0f"}
 
 
-def _quantity(name: str, of: Callable[..., Any], unit: str, meaning: str) -> Quantity:
-    return Quantity(name, of, unit, meaning, takes=StageSettings, form=_FORMS.get(unit, ".4g"))
+def _quantity(name: str, of: Callable[..., Any], unit: str, meaning: str, **options: Any) -> Quantity:
+    return Quantity(name, of, unit, meaning, takes=StageSettings, form=_FORMS.get(unit, ".4g"), **options)
 
 
 STAGE_QUANTITIES = Vocabulary(
     (
-        *(_quantity(name, partial(_number, of), unit, meaning) for name, (of, unit, meaning) in OF_STAGE.items()),
+        *(
+            _quantity(name, partial(_values, own.of), own.unit, own.meaning, reduction=own.reduction)
+            for name, own in OF_STAGE.items()
+        ),
         *(_quantity(name, partial(_of_contacts, of), "MPa", meaning) for name, (of, meaning) in OF_CONTACTS.items()),
         *(
-            replace(_quantity(name, partial(_of_losses, of), unit, meaning), better=better)
+            _quantity(name, partial(_of_losses, of), unit, meaning, better=better)
             for name, (of, unit, meaning, better) in OF_LOSSES.items()
         ),
         _quantity(
@@ -274,9 +300,9 @@ STAGE_QUANTITIES = Vocabulary(
         *(
             _quantity(
                 f"{name}{WITH_ERRORS}",
-                partial(_with_errors, OF_STAGE[name][0]),
-                OF_STAGE[name][1],
-                f"{OF_STAGE[name][2]}; 95 % quantile over stages with pin errors",
+                partial(_with_errors, name),
+                OF_STAGE[name].unit,
+                f"{OF_STAGE[name].meaning}; 95 % quantile over stages with pin errors",
             )
             for name in _ROBUST
         ),
