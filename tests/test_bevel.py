@@ -3,6 +3,7 @@
 import jax
 import numpy as np
 import pytest
+from catalogue import LINE
 
 import jaxgear as jg
 from jaxgear.geometry import BevelPair, virtual_load, virtual_pair
@@ -82,7 +83,6 @@ def test_refusals(options, message):
 @pytest.mark.slow
 def test_contact_of_virtual_gears():
     """Of tooth numbers that are not whole: between those of the neighbouring whole ones, with the same module."""
-    sizes = jg.Resolution(positions=16, pairs=2)
     bevel = BevelPair(17, 37, 4.0, face_width=20.0, pinion_bore_diameter=20.0, wheel_bore_diameter=40.0)
     pair = virtual_pair(bevel)
     module, teeth = float(pair.pinion.module), [float(each.teeth) for each in pair.gears]
@@ -94,7 +94,7 @@ def test_contact_of_virtual_gears():
             )
             for each, bore in zip(teeth, (20.0, 40.0))
         )
-        cycle = jg.solve(jg.prepare(jg.GearPair(*gears), resolution=sizes), 150.0)
+        cycle = jg.solve(jg.prepare(jg.GearPair(*gears), resolution=LINE), 150.0)
         assert cycle.converged.all()
         means.append(float(np.mean(cycle.transmission_error)))
     assert min(means[0], means[2]) < means[1] < max(means[0], means[2])
