@@ -137,6 +137,11 @@ BARE = STAGE.partition("[variables]")[0]
         ("teeth = 18", "teeth = 3", "planet.teeth: 3 must be at least"),
         ("teeth = 60", "teeth = 61", "stage: "),
         ("addendum = 0.8", "addendum = 3.0", "ring"),
+        (
+            "addendum = 0.8",
+            'support = { type = "support_arcs", arcs = 6, width = 6.0 }',
+            "ring.support: has to hold the ring of a stage alike all round",
+        ),
         ("planets = 4", "planets = 5", "stage: 84 teeth of sun and ring are no multiple of 5 planets"),
         ("planets = 4", 'planets = 4\nfixed = "sun"', 'stage: driving = "sun" must not be the fixed member'),
         ("pin_tolerance = 20.0", "", "stage.pin_samples: 3 has no effect without stage.pin_tolerance"),

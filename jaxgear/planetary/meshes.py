@@ -18,7 +18,7 @@ from ..contact import Mesh
 from ..contact.mesh import prepare_from
 from ..contact.prescribed import PrescribedContact, cycle_at_material, solve_at_material
 from ..contact.slide import RemovedMaterial, for_contact
-from ..contact.solve import check_mesh, flanks_of, material_of
+from ..contact.solve import check_alike, flanks_of, material_of
 from ..contact.status import Status, Statuses, status_of
 from ..geometry import explicit, pair_geometry
 from ..microgeometry import AbstractModification
@@ -235,7 +235,7 @@ class PreparedMesh(AbstractStageMesh):
     mesh: Mesh
 
     def __check_init__(self) -> None:
-        check_mesh(self.mesh)
+        check_alike(self.mesh)
 
     def placed(self, phases: Planets, central: Literal[0, 1]) -> AbstractPlacedMesh:
         """The mesh of every planet, prepared at positions that fall on those of the stage."""

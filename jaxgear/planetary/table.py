@@ -143,6 +143,8 @@ class StageSection(FurtherTable, section_of(PlanetaryStage, ("gears",), open=Fal
         given = {"load": {"torque": design.torque}, "pair": {"center_distance": distance}}
         with calling({"pinion": "planet"}):
             outer = design_of(design.path, {**self._ring_content(content), **given})
+        if not outer.pair().wheel.alike:
+            raise DesignFileError("ring.support", "has to hold the ring of a stage alike all round")
         planets, sun_teeth = self.planets, design.pair().pinion.teeth
         stage = self._stage(design, outer)
         share = float(1 / (planets * driving_torque(stage, 1.0)))
