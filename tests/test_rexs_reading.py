@@ -362,8 +362,8 @@ WIDTH = '<attribute id="face_width" unit="mm">20.0<'
 RACK = '<attribute id="tip_corner_radius_factor_reference_profile" unit="none">0.38</attribute>'
 REFUSED = {
     "one hand": (HELIX, HELIX.replace("0.0", "-12.5"), "wheel helix_angle = -12.5 deg must be 12.5 deg"),
-    "internal": (TEETH, TEETH.replace("19", "-19"), "number_of_teeth: is negative: an internal gear"),
-    "ring gear": ('type="cylindrical_gear"', 'type="ring_gear"', "ring_gear 3: is an internal gear"),
+    "two rings": ('type="cylindrical_gear"', 'type="ring_gear"', "has two ring gears, must have one at most"),
+    "bevel gear": ('type="cylindrical_gear"', 'type="bevel_gear"', "must be a cylindrical_gear or a ring_gear"),
     "protuberance": (RACK, RACK + attribute("protuberance_amount", "0.1"), "protuberance_amount: 0.1 must be 0"),
     "chamfer": (TEETH, attribute("chamfer_at_tooth_end", "0.5") + TEETH, "chamfer_at_tooth_end: 0.5 must be 0"),
     "no tip form": (TEETH, attribute("tip_form_diameter", "63.5") + TEETH, "tip_form_diameter = 63.5 mm must be"),

@@ -203,6 +203,11 @@ def test_derivatives(mode, double):
         assert np.allclose(central, IN_DOUBLE, rtol=1e-5, atol=1e-8)
 
 
+# the tip of the planet meets the fillet at its deepest, on the line of centres, 25 um inside
+DEEP = (
+    {"teeth": 63, "profile_shift": -0.02967, "addendum": 1.07354, "dedendum": 0.82854, "root_radius": 0.152},
+    {"teeth": 73, "profile_shift": -0.14067, "addendum": 0.54608, "dedendum": 1.28808, "cutter_teeth": 28},
+)
 PLANET, RING = jg.Gear(19, 3.0, face_width=20.0), jg.RingGear(64, 3.0, face_width=20.0)
 
 
@@ -211,6 +216,10 @@ PLANET, RING = jg.Gear(19, 3.0, face_width=20.0), jg.RingGear(64, 3.0, face_widt
     [
         (lambda: internal(R1[0], R1[1] | {"addendum": 1.0}), "reaches the pinion's flank"),
         (lambda: internal({"teeth": 36}, {"teeth": 42}), "clash"),
+        (
+            lambda: internal(*DEEP, module=3.8264, pressure_angle=17.5),
+            "reaches the wheel's flank at diameter 288.*at most",
+        ),
         (lambda: jg.RingGear(64, 3.0, face_width=20.0, rim_diameter=190.0), "rim_diameter = 190 mm must be greater"),
         (lambda: jg.RingGear(64, 3.0, face_width=20.0, tip_diameter=178.0), "than 180.421 mm, the base diameter"),
         (lambda: jg.RingGear(64, 3.0, face_width=20.0, cutter_teeth=10), "RingGear: cutter_teeth = 10 generates"),

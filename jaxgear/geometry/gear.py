@@ -189,9 +189,9 @@ class Gear(Checked):
         if self.helix_angle is not None:
             angle = concrete(self.helix_angle)
             given = "is traced" if angle is None else f"= {float(np.ravel(angle)[0]):g} deg"
-            raise ValueError(
-                f"{kind}: helix_angle {given}, must be 0 deg beside cutter_teeth: cutters are those of spur gears"
-            )
+            why = " beside cutter_teeth: cutters are those of spur gears"
+            why = ": spur ring gears alone are covered" if self.is_internal else why
+            raise ValueError(f"{kind}: helix_angle {given}, must be 0 deg{why}")
         for fault in _cutter_tip_faults(self):
             raise ValueError(fault)
 

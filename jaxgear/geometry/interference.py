@@ -34,19 +34,31 @@ def fillet_clearance(
     """
     base, tip = drawn.gear.base_radius, mate.tip_form_radius
     g = drawn.junction + jnp.linspace(0.0, 1.0, _POINTS, dtype=base.dtype) * (jnp.pi / 2 - drawn.junction)
-    x, y = drawn.curves.over(g.shape).trochoid(g)
-    squared = x**2 + y**2
-    # sin(psi / 2)^2 by the law of cosines; negative for points that the corner does not reach
-    reached = (squared - (distance - tip) ** 2) / (4 * distance * tip)
+
+    def drawn_at(g: Float[Array, " points"]) -> tuple[Float[Array, " points"], ...]:
+        x, y = drawn.curves.over(g.shape).trochoid(g)
+        squared = x**2 + y**2
+        # sin(psi / 2)^2 by the law of cosines; negative for points that the corner does not reach
+        return x, y, squared, (squared - (distance - tip) ** 2) / (4 * distance * tip)
+
+    *points, reached = drawn_at(g)
+    # the deepest point that it reaches, on the line of centres: the arc falls steeply towards it
+    count = jnp.sum(reached > 0)
+    last = jnp.clip(count - 1, 0, _POINTS - 2)
+    share = jnp.clip(reached[last] / (reached[last] - reached[last + 1]), 0.0, 1.0)
+    *deepest, _ = drawn_at(g[last][None] + share * (g[1] - g[0]))
+    x, y, squared = (jnp.concatenate(each) for each in zip(points, deepest))
+    met = jnp.append(reached > 0, count > 0)
     # a ring gear's tip lies inside its pitch circle: its corner is behind the line of centres
-    psi = mate.signed(2 * jnp.arcsin(safe_sqrt(jnp.minimum(reached, 0.5))))
+    at_last = jnp.where(count < _POINTS, 0.0, reached[-1])
+    psi = mate.signed(2 * jnp.arcsin(safe_sqrt(jnp.minimum(jnp.append(reached, at_last), 0.5))))
     working = jnp.arctan(pitch_roll_length / base)
     mate_roll = mate.base_radius * (psi + working + involute(mate.tip_roll_length / mate.base_radius))
     roll = pitch_roll_length + mate_pitch_roll_length - mate_roll
     fillet = roll / base - working - drawn.curves.base_half_angle + jnp.arctan(x / y)
     corner = jnp.arctan(-tip * jnp.sin(psi) / (distance - tip * jnp.cos(psi)))
     arc = drawn.gear.signed(jnp.sqrt(squared)) * (corner - fillet)
-    return jnp.min(jnp.where(reached > 0, arc, drawn.gear.module))
+    return jnp.min(jnp.where(met, arc, drawn.gear.module))
 
 
 class Tips(NamedTuple):

@@ -369,9 +369,9 @@ def _form_fault(name: str, mate: str, gear: Gear, clearance: float) -> str:
     form = outline(gear).form_roll_length
     reached = form + clearance
     wanted, start = f"{float(diameter(gear, form)):.6g} mm", f"GearPair: {mate} tip_diameter reaches the {name}'s flank"
-    if reached >= 0:
-        at = float(diameter(gear, reached))
-        return f"{start} at diameter {at:.6g} mm, must be at least its form diameter {wanted}"
+    if gear.is_internal or reached >= 0:
+        at, bound = float(diameter(gear, reached)), "most" if gear.is_internal else "least"
+        return f"{start} at diameter {at:.6g} mm, must be at {bound} its form diameter {wanted}"
     # where the involute has ended diameters grow again: only the roll length tells how far off it is
     return (
         f"{start} at a roll length of {float(reached):.4g} mm (below the base circle), must be at least "

@@ -17,7 +17,15 @@ from .write import write_rexs
 
 _REXS, _DESIGN = (".rexs", ".xml", ".rexsj", ".json", ".rexsz", ".zip"), (".toml",)
 _LOAD = "torque", "torque_lbf_in", "torque_lbf_ft", "speed"  # of [load], likewise
-_TAKEN = {"title", "materials", "pinion", "wheel", "pair", "load"}  # tables of a design file that REXS has a place for
+_TAKEN = {
+    "title",
+    "materials",
+    "pinion",
+    "wheel",
+    "ring",
+    "pair",
+    "load",
+}  # tables of a design file that REXS has a place for
 
 
 def convert(
@@ -126,7 +134,8 @@ def _to_rexs(source: Path, target: Path) -> None:
     _say(target, design.pair())
     tables = read(source)
     left = [f"[{name}]" for name in tables if name not in _TAKEN]
-    left += [f"{gear}.coast_modification" for gear in ("pinion", "wheel") if "coast_modification" in tables[gear]]
+    gears = (name for name in ("pinion", "wheel", "ring") if name in tables)
+    left += [f"{gear}.coast_modification" for gear in gears if "coast_modification" in tables[gear]]
     left += [f"load.{name}" for name in tables["load"] if name not in _LOAD]
     if left:
         terminal.say(f"left out, REXS has no place for it: {', '.join(left)}")

@@ -84,8 +84,9 @@ class _Rise(NamedTuple):
         if self.on_face:
             return frame.place(self.end, value)
         found = float(frame.roll_length(value))
-        if not found >= 0:
-            raise part.refuse(name, f"{value:g} mm must be at least {2 * frame.base_radius:g} mm, the base diameter")
+        if np.isnan(found):
+            base = f"{2 * abs(frame.base_radius):g} mm, the base diameter"
+            raise part.refuse(name, f"{value:g} mm must be at least {base}")
         return found if self.end == "tip" else -found
 
     def needed(self, part: Component, name: str, frame: Frame) -> float:
@@ -161,7 +162,11 @@ def _components(term: Any, frame: Frame, owner: str, error: float) -> Iterator[t
     """Types of the components of a term, with (value, unit) of their attributes."""
     relief = hasattr(term, "curve")
     shares = powers(term.curve) if relief else {0: 1.0}
-    if type(term) not in _EXACT or shares is None or (isinstance(term, TipRelief) and frame.tip < float(term.length)):
+    if (
+        type(term) not in _EXACT
+        or shares is None
+        or (isinstance(term, TipRelief) and 0 < frame.tip < float(term.length))
+    ):
         yield "topographical_modification", _points(term, frame, owner, error)
     elif not relief or float(term.length) > 0:
         for power, share in shares.items():

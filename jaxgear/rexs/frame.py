@@ -25,8 +25,8 @@ class Frame:
     """One gear's flank within its pair, all numbers in mm.
 
     Attributes:
-        base_radius: base radius of the gear.
-        start, tip: roll lengths at both ends of the active profile.
+        base_radius: base radius of the gear, negative of a ring gear.
+        start, tip: roll lengths at both ends of the active profile, likewise.
         width: face width of the gear.
         datum: -1 where the datum face is at negative coordinates of the file, 1 at positive ones.
         mirror: -1 where face coordinates of the library are those of the file with the other sign.
@@ -47,7 +47,7 @@ class Frame:
         """Roll length at a diameter; NaN below the base circle."""
         square = (0.5 * np.asarray(diameter)) ** 2 - self.base_radius**2
         below = square < -_ROUNDING * self.base_radius**2
-        return np.where(below, np.nan, np.sqrt(np.maximum(square, 0.0)))
+        return np.where(below, np.nan, np.copysign(np.sqrt(np.maximum(square, 0.0)), self.base_radius))
 
     def place(self, face: str, length: float) -> float:
         """Coordinate of the file at a distance from the middle towards the "datum_face" or the "non_datum_face"."""

@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from ..geometry import Gear, Material, allowance_of_balls, measures, over_balls
-from ..io.errors import refused
+from ..geometry import Gear, Material, RingGear, allowance_of_balls, measures, over_balls
+from ..io.errors import DesignFileError, refused
 from ..numerics import real
 from .model import CUSTOM, Component, Model, shifted
-from .open_numbers import FLANK, GEAR, TOOL, Completed, attributes, rack_by_hand
+from .open_numbers import CUTTER, FLANK, GEAR, RING, TOOL, Completed, attributes, rack_by_hand
 
 GENERATED = "generated_addendum_modification_coefficient"
 CHORDS = "chordal_tooth_thickness_upper_deviation", "chordal_tooth_thickness_lower_deviation"
@@ -108,7 +108,7 @@ def _nominal(gear: Gear) -> tuple[float, float]:
     Both of the normal section, whose circle has the curvature of the reference cylinder there, d / cos(beta)^2.
     """
     module, shift, angle = float(gear.module), float(gear.profile_shift), np.deg2rad(float(gear.pressure_angle))
-    return 2 * float(gear.pitch_radius / gear.helix_cosine**2), float(
+    return 2 * float(gear.signed(gear.pitch_radius) / gear.helix_cosine**2), float(
         module * (0.5 * np.pi + 2 * shift * np.tan(angle))
     )
 
@@ -139,7 +139,8 @@ _LENGTHS = {  # by the coefficient of the module that each is
     "tip_corner_radius_factor_reference_profile": "tip_corner_radius_reference_profile",
 }
 _ISO_53 = "basic rack of ISO 53"
-_TOOL = "rack_shaped_tool"
+_TOOL, _CUTTER = "rack_shaped_tool", "cutter_wheel_tool"
+_RING = "ring_gear"
 _SETTINGS = "cylindrical_gear_manufacturing_settings"
 _DEDENDUM_DIGITS = 9  # behind the point: further ones are of the way through the root diameter
 _CHAMFER = "chamfer_at_tooth_end"
@@ -157,12 +158,15 @@ _CLOSE = 1e-9  # difference of numbers that mean the same: relative ones, and pr
 _ALIKE = 2e-3  # mm, by which diameters on a drawing are rounded
 
 
-def check_external(gear: Component) -> None:
-    """Raise unless the gear is an external cylindrical gear."""
-    if gear.type != "cylindrical_gear":
-        raise gear.refuse("", "is an internal gear, must be a cylindrical_gear with external teeth")
-    if gear.needed("number_of_teeth", "none") < 0:
-        raise gear.refuse("number_of_teeth", "is negative: an internal gear, must have external teeth")
+def is_internal(gear: Component) -> bool:
+    """True for a ring gear, whose number of teeth may be negative.
+
+    Raises:
+        DesignFileError: for a component that is neither a cylindrical gear nor a ring gear.
+    """
+    if gear.type not in ("cylindrical_gear", _RING):
+        raise gear.refuse("", f"must be a cylindrical_gear or a {_RING}")
+    return gear.type == _RING or gear.needed("number_of_teeth", "none") < 0
 
 
 def _helix_angle(gear: Component, pressure_angle: float) -> float:
@@ -210,7 +214,8 @@ def read_gear(model: Model, gear: Component, flank: Component, owner: str, compl
     Raises:
         DesignFileError: for what is missing or not of the library.
     """
-    tool, settings = _manufacturing(model, flank, owner, completed)
+    internal = is_internal(gear)
+    tool, settings = _manufacturing(model, flank, owner, completed, internal)
     for part in (tool, settings):
         for kind, name, unit in _NOT_HERE:
             if part.type == kind and (value := part.number(name, unit)):
@@ -233,16 +238,21 @@ def read_gear(model: Model, gear: Component, flank: Component, owner: str, compl
     profile_shift = _relative(flank, attribute, module)
     if profile_shift is None:
         raise flank.missing(attribute)
+    on_gear = (RING if internal else GEAR) | _EDGE
+    of_tool = CUTTER if tool.type == _CUTTER else TOOL
     options: dict[str, float | None] = {
-        **{field: gear.number(name, unit) for field, (name, unit) in (GEAR | _EDGE).items()},
+        **{field: gear.number(name, unit) for field, (name, unit) in on_gear.items()},
         **{field: flank.number(name, unit) for field, (name, unit) in FLANK.items()},
-        **{field: _relative(tool, name, module) for field, (name, _) in TOOL.items()},
+        **{field: _relative(tool, name, module) for field, (name, _) in of_tool.items()},
         "teeth": gear.needed("number_of_teeth", "none"),
         "profile_shift": profile_shift,
         "helix_angle": _helix_angle(gear, angle),
         "face_width": gear.needed("face_width", "mm"),
         "tip_form_diameter": _tip_form(gear, flank),
     }
+    if internal:
+        material = _material(model, gear, owner, completed)
+        return _complete_ring(gear, tool, settings, owner, options, material, completed)
     if options["bore_diameter"] == 0:
         problem = (
             f"0 mm: give the diameter at which the body is held, that of the shaft: --set {owner}.bore_diameter=MM"
@@ -284,6 +294,56 @@ def _complete(
     return found
 
 
+def _complete_ring(
+    gear: Component,
+    tool: Component,
+    settings: Component,
+    owner: str,
+    options: dict[str, float | None],
+    material: Material,
+    completed: Completed,
+) -> Gear:
+    """Ring gear from the numbers of a file, whose teeth and diameters may be negative, as `_complete`."""
+    for key in ("bore_diameter", "dedendum", "root_radius"):
+        if f"{owner}.{key}" in completed.given:
+            raise DesignFileError("", f"--set {owner}.{key} has no effect, {gear.where()} is a ring gear")
+    given = {
+        name: abs(value) if name == "teeth" or name.endswith("diameter") else value
+        for name, value in options.items()
+        if value is not None
+    }
+
+    def made() -> Gear:
+        nominal: RingGear = refused(gear.where(), RingGear, **given, material=material)
+        found: Any = refused(gear.where(), replace, nominal, **read_thickness(gear, nominal))
+        return as_cut(settings, found, owner, completed)
+
+    root, height = gear.number("root_diameter", "mm"), _relative(tool, TOOL["dedendum"][0], float(given["module"]))
+    if "dedendum" not in given and (root is not None or height is not None):
+        radius = given.pop("root_radius", None)  # there may be no room for it yet
+        found = made()
+        cutter = found.cutter
+        assert cutter is not None and found.cutter_teeth is not None and found.cutter_profile_shift is not None
+        reached = 0.5 * abs(root or 0.0)
+        if height is not None and root is None:
+            tip = 0.5 * found.cutter_teeth + found.cutter_profile_shift + height
+            reached = float(found.module * tip - cutter.center_distance)
+        deeper = reached + float(found.root_circle_radius)
+        given["dedendum"] = round(float(found.dedendum) + deeper / float(found.module), _DEDENDUM_DIGITS)
+        given |= {} if radius is None else {"root_radius": radius}
+    found = made()
+    for name, (value, why) in {
+        "dedendum": (found.dedendum, _ISO_53),
+        "cutter_teeth": (found.cutter_teeth, "0.4 z"),
+        "root_radius": (found.root_radius, _ISO_53),
+        "tip_diameter": (-2 * found.tip_radius, f"addendum {float(found.addendum):g} x module"),
+        "rim_diameter": (-2 * found.bore_radius, "a rim of 3.5 modules"),
+    }.items():
+        if name not in given:
+            completed.say(f"{owner}.{name}", float(np.asarray(value)), why)
+    return found
+
+
 def read_quality(gear: Component) -> int | None:
     """Flank tolerance class of ISO 1328-1:2013; None if it is missing."""
     if QUALITY not in gear.attributes:
@@ -295,15 +355,19 @@ def write_gear(
     model: Model, gear: Gear, name: str, quality: int | None, material_name: str | None = None
 ) -> tuple[Component, list[Component]]:
     """Write a gear; returns the components of the gear and of its left and right flank."""
-    if gear.is_internal:
-        raise ValueError(f"{name} is a RingGear: external gears alone can be written")
-    tip = 2 * gear.tip_radius if gear.tip_diameter is None else gear.tip_diameter
+    tip = 2 * gear.signed(gear.tip_radius) if gear.tip_diameter is None else gear.tip_diameter
     hand = 0.0 if gear.helix_angle is None else gear.helix_angle
     part = model.add(
-        "cylindrical_gear",
+        _RING if gear.is_internal else "cylindrical_gear",
         name,
-        **attributes(GEAR | _EDGE, gear, teeth=int(gear.teeth), helix_angle=hand, tip_diameter=tip),
-        root_diameter=(2 * gear.root_circle_radius, "mm"),
+        **attributes(
+            (RING if gear.is_internal else GEAR) | _EDGE,
+            gear,
+            teeth=int(gear.teeth),
+            helix_angle=hand,
+            tip_diameter=tip,
+        ),
+        root_diameter=(2 * gear.signed(gear.root_circle_radius), "mm"),
         datum_face_orientation=("negative", "none"),
         **{QUALITY: (None if quality is None else str(quality), "none")},
         **write_thickness(gear),
@@ -311,12 +375,17 @@ def write_gear(
     )
     material = model.add("material", material_name or f"{name} material", **_of_material(_MATERIAL, gear.material))
     model.relate("reference", origin=part, referenced=material)
+    of_tool = attributes(TOOL, gear)
+    if gear.is_internal:
+        assert gear.cutter_teeth is not None
+        height = TOOL["dedendum"][0], (gear._tool_height(), "none")
+        of_tool = attributes(CUTTER, gear, cutter_teeth=int(gear.cutter_teeth)) | dict([height])
     tool = model.add(
-        _TOOL,
+        _CUTTER if gear.is_internal else _TOOL,
         f"{name} tool",
         normal_module=(gear.module, "mm"),
         normal_pressure_angle=(gear.pressure_angle, "deg"),
-        **attributes(TOOL, gear),
+        **of_tool,
     )
     settings = model.add(_SETTINGS, f"{name} settings", **{GENERATED: (gear.generating_profile_shift, "none")})
     flanks = [
@@ -334,20 +403,22 @@ def _of_material(fields: dict[str, tuple[str, str, int]], material: Material) ->
     return {name: (shifted(value, -shift) if shift else value, unit) for name, value, unit, shift in held}
 
 
-def _manufacturing(model: Model, flank: Component, owner: str, completed: Completed) -> tuple[Component, Component]:
+def _manufacturing(
+    model: Model, flank: Component, owner: str, completed: Completed, internal: bool
+) -> tuple[Component, Component]:
     """Tool and settings of the one step that makes a flank, with the numbers that are given.
 
     Both are empty for a file without tools, and where the numbers that are given say all of the tool.
     """
     settings = Component(0, _SETTINGS)
     tools = model.related("manufacturing_step", "workpiece", flank.id, "tool")
-    if not tools or all(f"{owner}.{name}" in completed.given for name in TOOL):
+    if not tools or (not internal and all(f"{owner}.{name}" in completed.given for name in TOOL)):
         return completed.of(owner, Component(0, _TOOL), TOOL), settings
     if len(tools) > 1:
         known = ", ".join(str(tool.id) for tool in tools)
         problem = f"must be made by one {_TOOL}, its tools are {known}; {rack_by_hand(owner)}"
         raise flank.refuse("", problem)
-    if tools[0].type != _TOOL:
+    if tools[0].type != _TOOL and (tools[0].type != _CUTTER or not internal):
         raise tools[0].refuse("", f"makes a flank, must be a {_TOOL}; {rack_by_hand(owner)}")
     found = model.related("manufacturing_step", "workpiece", flank.id, "manufacturing_settings")
     return completed.of(owner, tools[0], TOOL), found[0] if found else settings

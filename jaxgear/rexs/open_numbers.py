@@ -11,7 +11,7 @@ from typing import Any
 
 from ..geometry import Gear
 from ..io.errors import DesignFileError, not_known
-from .model import Attribute, Component
+from .model import CUSTOM, Attribute, Component
 
 # Keys of a design file: attribute of REXS and its unit there, by the component that says it.
 GEAR = {
@@ -30,6 +30,14 @@ FLANK = {
 }
 TOOL = {
     "dedendum": ("addendum_coefficient_reference_profile", "none"),
+    "root_radius": ("tip_corner_radius_factor_reference_profile", "none"),
+}
+# Of a ring gear, beside the numbers of its flanks; the addendum of its cutter follows from the root circle.
+RING = {name: at for name, at in GEAR.items() if name != "bore_diameter"}
+RING |= {"rim_diameter": (f"{CUSTOM}rim_diameter", "mm")}
+CUTTER = {
+    "cutter_teeth": ("number_of_teeth", "none"),
+    "cutter_profile_shift": ("addendum_modification_coefficient", "none"),
     "root_radius": ("tip_corner_radius_factor_reference_profile", "none"),
 }
 STAGE = {"center_distance": ("center_distance", "mm")}

@@ -172,13 +172,15 @@ def flank_of(component: Component, frame: Frame) -> AbstractModification:
     coordinates, column = np.unique(frame.mirror * coordinate, return_inverse=True)
     roll = frame.roll_length(diameters)
     if np.isnan(roll).any():
-        below = f"{diameters[0]:.9g} mm must be at least {2 * frame.base_radius:.9g} mm, the base diameter"
+        below = f"{diameters[0]:.9g} mm must be at least {2 * abs(frame.base_radius):.9g} mm, the base diameter"
         raise component.refuse("diameters_of_topographical_modification", below)
     grid = np.full((len(diameters), len(coordinates)), np.nan)
     grid[row, column] = amount
     if len(amount) != grid.size or np.isnan(grid).any() or len(diameters) < 2:
         wanted = "must be a full grid of at least 2 diameters, every point once"
         raise component.refuse(_POINTS, f"{wanted}: {len(amount)} points, {len(diameters)} x {len(coordinates)}")
+    if frame.base_radius < 0:  # roll lengths of a ring gear grow inwards
+        roll, grid = roll[::-1], grid[::-1]
     if (grid == grid[:, :1]).all():
         return TabulatedProfile(real(roll), real(grid[:, 0]))
     return TabulatedFlank(real(roll), real(coordinates), real(grid))

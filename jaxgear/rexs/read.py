@@ -18,7 +18,7 @@ from ..numerics import real
 from .flanks import read_modification
 from .forms import parse
 from .frame import Frame, frames
-from .gears import QUALITY, check_external, read_gear, read_quality
+from .gears import QUALITY, is_internal, read_gear, read_quality
 from .model import Component, Model
 from .open_numbers import FLANK, GEAR, OFFSET, STAGE, Completed
 from .points import joined
@@ -47,7 +47,7 @@ class RexsPair:
 
     Attributes:
         title: name of the model, "" where it has none.
-        pair: the gears; gear 1 of the stage is the pinion, which drives.
+        pair: the gears; gear 1 of the stage is the pinion, which drives; a ring gear is always the wheel.
         pinion, wheel: modifications of the flanks.
         torque: torque on the pinion [N m], None if the file gives none.
         speed: speed of the pinion [rpm], None if the file gives none.
@@ -71,7 +71,7 @@ def read_rexs(
     load_case: int | None = None,
     given: Mapping[str, float] | None = None,
 ) -> RexsPair:
-    """Read an external pair from a REXS file in XML or JSON, or in a zip archive of one (.rexsz).
+    """Read a gear pair from a REXS file in XML or JSON, or in a zip archive of one (.rexsz).
 
     Modifications of version 1.4 or later are read; a file of an earlier version with modifications is refused.
 
@@ -97,8 +97,8 @@ def read_rexs(
             read, with face_width chamfered tooth ends are not.
 
     Raises:
-        DesignFileError: for invalid or unsupported content, in one line that names component and attribute: internal
-            gears, protuberance, chamfers, several tools, shapes of a relief without a formula, missing data, other
+        DesignFileError: for invalid or unsupported content, in one line that names component and attribute:
+            protuberance, chamfers, several tools, shapes of a relief without a formula, missing data, other
             units, XML that is not well-formed or declares a document type.
     """
     file = Path(path)
@@ -148,14 +148,14 @@ def read_stage(model: Model, stage: int | None, flank: str | None, completed: Co
     """
     chosen = completed.of("pair", _stage(model, stage), STAGE)
     gears = _with_given(model, _driving_first(model, chosen), completed)
-    for gear in gears:
-        check_external(gear)
+    if all(map(is_internal, gears)):
+        raise chosen.refuse("", "has two ring gears, must have one at most")
     _check_version(model)
     _check_axes(gears)
     flank = _loaded(model, chosen, gears) if flank is None else flank
     flanks = [_flank(model, gear, flank) for gear in gears]
     pinion, wheel = (read_gear(model, *each, completed) for each in zip(gears, flanks, _NAMES))
-    distance = chosen.needed("center_distance", "mm")
+    distance = abs(chosen.needed("center_distance", "mm"))
     offset = completed.given.get(OFFSET, 0.0)
     if OFFSET in completed.given:
         completed.say(OFFSET, offset, "given")
@@ -189,11 +189,15 @@ def _with_active_tips(
         gear = getattr(pair, name)
         reached = float(diameter(gear, end))
         for part, value in parts:
-            if value is None or value >= reached - _ROUNDED or any(f"{name}.{tip}" in completed.given for tip in _TIPS):
+            if (
+                value is None
+                or gear.signed(abs(value) - reached) >= -_ROUNDED
+                or any(f"{name}.{tip}" in completed.given for tip in _TIPS)
+            ):
                 continue
             if gear.tip_form_diameter is not None:
                 raise part.refuse(_ACTIVE_TIP, f"{value:g} mm must be {reached:.6g} mm, by the tip form diameter")
-            ending = refused(part.where(_ACTIVE_TIP), replace, gear, tip_form_diameter=real(value))
+            ending = refused(part.where(_ACTIVE_TIP), replace, gear, tip_form_diameter=real(abs(value)))
             pair = refused(part.where(_ACTIVE_TIP), replace, pair, **{name: ending})
             completed.say(f"{name}.tip_form_diameter", value, _ACTIVE_TIP)
     return pair
@@ -239,9 +243,15 @@ def _chosen(kind: str, option: str, known: list[int], wanted: int | None, hint: 
 
 
 def _driving_first(model: Model, stage: Component) -> list[Component]:
-    """The gears of a stage: gear 1 and 2, or the other way round where the file says that gear 2 drives."""
+    """The gears of a stage: gear 1 and 2, or the other way round where the file says that gear 2 drives.
+
+    A ring gear is always the wheel.
+    """
     gears = [_one(model.related("stage", "stage", stage.id, role), stage, role) for role in ("gear_1", "gear_2")]
     drives = [any(part.flag("is_driving_gear", False) for part in _data(model, stage, gear)) for gear in gears]
+    inside = [is_internal(gear) for gear in gears]
+    if any(inside):
+        return gears[::-1] if inside == [True, False] else gears
     return gears[::-1] if drives == [False, True] else gears
 
 
@@ -391,7 +401,7 @@ def _number_of_case(model: Model, case: dict[int, Component], ids: list[int], na
 
 _PAIR = "cylindrical_stage"
 _OTHER = {  # kinds of stages without a pair of their own
-    "planetary_stage": "planetary stage with its carrier: its external cylindrical stages are pairs of their own",
+    "planetary_stage": "planetary stage with its carrier: its cylindrical stages are pairs of their own",
     "bevel_stage": "bevel gears, must be cylindrical gears",
     "worm_stage": "worm gears, must be cylindrical gears",
 }

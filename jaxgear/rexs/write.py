@@ -77,7 +77,7 @@ def write_rexs(
     for name, gear in zip(_NAMES, pair.gears):
         if gear.protuberance is not None:
             raise ValueError(f"write_rexs: {name} protuberance: must be left out, it is not written yet")
-        if gear.cutter_teeth is not None:
+        if gear.cutter_teeth is not None and not gear.is_internal:
             problem = f"{float(gear.cutter_teeth):g} must be left out: tools are written as racks alone"
             raise ValueError(f"write_rexs: {name} cutter_teeth = {problem}")
     model = Model(_VERSION)
