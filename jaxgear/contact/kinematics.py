@@ -289,6 +289,8 @@ class _End(NamedTuple):
         farthest: largest roll length of the mate that a tip corner touches [mm]. In an internal pair it ends at the
             middle of the mate's flank, and where flanks would not fit into each other: corners far out swing back.
         reach: beyond this distance the gap goes on along its tangent, so that far pairs stay finite and apart [mm].
+        least_reach: in an internal pair, distance whose tangent the gap never falls below: corners far out, where the
+            mate has no flank, may come back; None in an external pair [mm].
     """
 
     outside: Real
@@ -297,6 +299,7 @@ class _End(NamedTuple):
     tip_gear_end: Scalar
     farthest: Scalar
     reach: Scalar
+    least_reach: Scalar | None
 
     def at_contacts(self, value: Array) -> Array:
         """One number at every contact each: a derivative then sums over the contacts once."""
@@ -320,6 +323,10 @@ class _End(NamedTuple):
         """Distance of the contacts outside [mm], from zero to the reach."""
         return jnp.clip(self.outside, 0.0, self.reach)
 
+    def going_on(self, gap: Real, slope: Real, reach: Scalar) -> Real:
+        """Gap [um] that goes on along its tangent beyond a distance [mm]."""
+        return gap + slope * (jnp.maximum(self.outside, reach) - reach)
+
 
 def _ends(pair: GearPair, contact: PathOfContact, path: Real) -> tuple[_End, _End]:
     """Start and end of the path of contact."""
@@ -332,9 +339,10 @@ def _ends(pair: GearPair, contact: PathOfContact, path: Real) -> tuple[_End, _En
     if pair.wheel.is_internal:
         reach = jnp.where(pair.wheel.teeth - pair.pinion.teeth < _CLOSE_TEETH, _CLOSE_REACH, REACH)
     start, end = (
-        (shortened > 0, reach * contact.base_pitch + shortened)
+        (shortened > 0, reach * contact.base_pitch + shortened, REACH * contact.base_pitch + shortened)
         for shortened in (contact.start_shortened, contact.end_shortened)
     )
+    least = (start[2], end[2]) if pair.wheel.is_internal else (None, None)
     approach = pair.wheel.tip_roll_length, wheel_base, first, pinion_base
     recess = pair.pinion.tip_roll_length, pinion_base, before_last, wheel_base
     farthest = [jnp.full_like(first, jnp.inf)] * 2
@@ -344,8 +352,8 @@ def _ends(pair: GearPair, contact: PathOfContact, path: Real) -> tuple[_End, _En
             jnp.minimum(0.5 * (mate - tip), middle) for (tip, _, mate, _), middle in zip((approach, recess), middles)
         ]
     return (
-        _End(contact.start - path, start[0], approach, second, farthest[0], start[1]),
-        _End(path - contact.end, end[0], recess, last, farthest[1], end[1]),
+        _End(contact.start - path, start[0], approach, second, farthest[0], start[1], least[0]),
+        _End(path - contact.end, end[0], recess, last, farthest[1], end[1], least[1]),
     )
 
 
@@ -387,7 +395,12 @@ def _corner(end: _End, edge_radius: Scalar) -> _Corner:
 
     near, beyond = end.near, end.outside > 0
     (gap, touched), (slope, _) = jax.jvp(touching, (near,), (jnp.ones_like(near),))
-    gap = gap + slope * (jnp.maximum(end.outside, end.reach) - end.reach)
+    gap = end.going_on(gap, slope, end.reach)
+    if end.least_reach is not None:
+        near = jnp.clip(end.outside, 0.0, end.least_reach)
+        (least, _), (rise, _) = jax.jvp(touching, (near,), (jnp.ones_like(near),))
+        least = end.going_on(least, rise, end.least_reach)
+        gap, slope = jnp.maximum(gap, least), jnp.where(gap < least, rise, slope)
     return _Corner(jnp.where(beyond, gap, 0.0), jnp.where(beyond, slope, 0.0), touched)
 
 
