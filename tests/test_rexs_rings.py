@@ -1,12 +1,16 @@
 """REXS files of ring gears: numbers, tool and flanks come back; what other programs leave open is completed."""
 
+import dataclasses
+from functools import partial
+
 import jax
 import numpy as np
 import pytest
 import rexs_schema
 
 import jaxgear as jg
-from jaxgear.io import load_design
+from jaxgear.geometry.rim_support import ElasticFoundation
+from jaxgear.io import load_design, write_design
 from jaxgear.rexs import read_rexs, write_rexs
 from jaxgear.rexs.convert import convert
 from jaxgear.rexs.frame import frames
@@ -93,6 +97,13 @@ def test_the_command_converts_ring_pairs(written, tmp_path):
     same(load_design(tmp_path / "pair.toml").pair(), PAIR)
     convert(tmp_path / "pair.toml", tmp_path / "again.rexs", **options)
     same(read_rexs(tmp_path / "again.rexs").pair, PAIR)
+
+
+@pytest.mark.parametrize("write", [write_rexs, partial(write_design, pinion=None, wheel=None)])
+def test_supports_of_a_rim_are_refused(tmp_path, write):
+    held = dataclasses.replace(RING, support=ElasticFoundation(1e3))
+    with pytest.raises(ValueError, match="supports of a rim are not written yet"):
+        write(tmp_path / "pair.toml", jg.GearPair(PLANET, held, 67.5), torque=100.0)
 
 
 @pytest.mark.parametrize(

@@ -206,9 +206,10 @@ def write_design(
         title: free text.
 
     Raises:
-        ValueError: for a torque that is not positive, or where the file cannot be written.
+        ValueError: for a torque that is not positive, a ring gear with a support, or where the file cannot be written.
     """
     check("torque", torque, "N m", low=0.0, open_low=True)
+    check_rim(pair, "write_design")
     lines = [f"title = {_text(printable(title))}", ""] if title else []
     names = "pinion", "ring" if pair.wheel.is_internal else "wheel"
     for name, gear, quality in zip(names, pair.gears, quality_classes or (None, None)):
@@ -228,6 +229,16 @@ def write_design(
     text = "\n".join(lines) + "\n"
     with writing(path):
         write_durably(Path(path), lambda file: file.write(text.encode("utf-8")))
+
+
+def check_rim(pair: GearPair, owner: str) -> None:
+    """Raise for a ring gear with a support, which files are not written with; `owner` is the function in the message.
+
+    Raises:
+        ValueError: for such a ring gear.
+    """
+    if getattr(pair.wheel, "support", None) is not None:
+        raise ValueError(f"{owner}: wheel support must be None: supports of a rim are not written yet")
 
 
 def _gear(gear: Gear) -> Iterator[str]:

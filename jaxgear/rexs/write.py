@@ -11,6 +11,7 @@ from ..contact import MeshCycle
 from ..contact.status import reason
 from ..geometry import GearPair, tooth_thickness
 from ..io.folder import writing
+from ..io.write_design import check_rim
 from ..metrics import flash_temperature
 from ..microgeometry import AbstractModification
 from ..numerics import check
@@ -74,6 +75,7 @@ def write_rexs(
     if float(pair.axial_offset) != 0:
         problem = "must be 0 mm: a stage of REXS has no place for it"
         raise ValueError(f"write_rexs: axial_offset = {float(pair.axial_offset):g} mm {problem}")
+    check_rim(pair, "write_rexs")
     for name, gear in zip(_NAMES, pair.gears):
         if gear.protuberance is not None:
             raise ValueError(f"write_rexs: {name} protuberance: must be left out, it is not written yet")
