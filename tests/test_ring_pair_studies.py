@@ -46,6 +46,7 @@ def test_flanks_slide_by_the_difference_of_the_speeds():
     assert float(ohlendorf_loss_factor(PAIR)) == pytest.approx(wanted, rel=1e-4)
 
 
+@pytest.mark.slow
 def test_both_flanks_wear_where_they_touch(mesh):
     """The same volume of both; one passage wears the ring rho_1 z_2 / (rho_2 z_1) times as deep as the planet."""
     cycle = jg.solve(mesh, 100.0)
