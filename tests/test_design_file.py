@@ -932,6 +932,7 @@ def test_examples_load_and_are_what_their_name_says(path):
         "wear": "wear" in file.tables,
         "teeth": "teeth" in file.tables,
         "layout": "layout" in file.tables,
+        "planetary": "stage" in file.tables,
     }
     hand = "spur" if file.pair().is_spur else "helical"
     kind = next((name for name, is_so in kinds.items() if is_so), hand)

@@ -26,6 +26,7 @@ EXAMPLES = (
     "which_relief_for_one_speed",
     "how_quiet_is_helical",
     "how_quiet_within_safety",
+    "what_does_stage_design_buy",
 )
 
 
@@ -44,8 +45,8 @@ def answers(name):
     return pytest.fixture(scope="module")(lambda: example(name).numbers(results(name)))
 
 
-relief, coupling, curve, robust, manufactured, driven, simulated, quiet, made, lasting, calm, helical, safe = map(
-    answers, EXAMPLES
+relief, coupling, curve, robust, manufactured, driven, simulated, quiet, made, lasting, calm, helical, safe, stage = (
+    map(answers, EXAMPLES)
 )
 
 
@@ -295,3 +296,11 @@ def test_quiet_gears_keep_their_safeties(safe):
         assert safe[f"{flank}_{symbol}"] > 0.999 * safe[f"{start}_{symbol}"]
         assert safe[f"{gears}_{symbol}"] > 0.999 * least
     assert safe["slopes_error"] < 1e-6
+
+
+def test_a_stage_is_quieter_by_reliefs_that_are_found_in_it(stage):
+    """Phases of the planets suppress most orders of a mesh: what flattens every mesh is not what the rest needs."""
+    alone, inside = (stage[f"{name}_stage_ppte"] for name in ("each_mesh_by_itself", "in_the_stage"))
+    assert inside < 0.8 * alone < 0.8 * stage["unmodified_stage_ppte"]
+    assert stage["in_the_stage_sun_mesh_ppte"] > stage["each_mesh_by_itself_sun_mesh_ppte"]
+    assert stage["unmodified_stage_ppte_with_pin_errors"] > 1.2 * stage["unmodified_stage_ppte"]
