@@ -21,14 +21,15 @@ from jaxgear.layout import (
     FlankLineTolerance,
     at_stations,
     at_torque,
-    crowning_off_the_edges,
     damage,
     face_load_over_torques,
     flank_line_tolerance,
     gear_lives,
     helix_slope_limits,
+    iso_end_relief_width,
     layout_findings,
     layout_flank_lines,
+    least_off_the_edges,
     level_load,
     lives_in_cases,
     longest_life,
@@ -52,6 +53,7 @@ from jaxgear.shafts import (
     support,
 )
 from jaxgear.shafts.gearbox import axes_of, tip_clearances
+from jaxgear.shafts.mesh_support import even_coordinates
 from jaxgear.tolerance import ToleranceClass
 
 PAIR = jg.GearPair(PINION, WHEEL)
@@ -155,7 +157,7 @@ def amounts_of(diameter):
         box = eqx.tree_at(lambda box: box.shafts[1].sections[0].diameter, BOX, diameter)
         face = at_stations(support(box, 1), stations=11)
         line = level_load(face, stations=11)
-        further = crowning_off_the_edges(face, TOLERANCE, line=FlankLine(7.0, 2.0), stations=11)
+        further = least_off_the_edges(face, TOLERANCE, line=FlankLine(7.0, 2.0), stations=11)
         return jnp.stack([line.slope, line.crowning, further])
 
     return jax.jvp(amounts, (diameter,), (jnp.ones_like(diameter),))
@@ -241,18 +243,74 @@ def test_least_crowning_brings_the_peak_just_inside():
     slope = 10.0
     tolerance = FlankLineTolerance(slope)
     face = rigid_face()
-    found = crowning_off_the_edges(face, tolerance)
+    found = least_off_the_edges(face, tolerance)
     # both stations at the end carry alike: the peak is between them
     peak = 0.5 - 1.0 / STATIONS
     np.testing.assert_allclose(found, slope / (8 * peak), rtol=1e-4)
     for factor, touches in ((0.9, True), (1.02, False)):
         cases = tolerance_cases(face, tolerance, wheel=FlankLine(0.0, factor * found))
         assert bool(cases.edge_contact.any()) == touches
-    stricter = crowning_off_the_edges(face, tolerance, share=0.8)
+    stricter = least_off_the_edges(face, tolerance, share=0.8)
     cases = tolerance_cases(face, tolerance, wheel=FlankLine(0.0, stricter))
     load = np.asarray(cases.load.line_load[1])
     np.testing.assert_allclose(max(load[0], load[-1]), 0.8 * load.max(), rtol=1e-4)
-    assert float(crowning_off_the_edges(face, FlankLineTolerance(0.0))) == 0.0
+    assert float(least_off_the_edges(face, FlankLineTolerance(0.0))) == 0.0
+
+
+WIDE = jg.GearPair(eqx.tree_at(lambda gear: gear.face_width, PINION, jnp.asarray(30.0)), WHEEL, axial_offset=2.0)
+
+
+def test_the_least_end_relief_is_as_steep_as_the_deviation():
+    """The load of a rigid pair falls from where the relief begins on: C / L = f / b, and K_Hbeta is that there."""
+    slope, width = 10.0, 3.0
+    found = layout_flank_lines(rigid_face(), FlankLineTolerance(slope), end_relief=width, stations=STATIONS)
+    np.testing.assert_allclose(found.needed, slope * width / WIDTH, rtol=1e-9)
+    np.testing.assert_allclose(found.further, 0.5 * found.needed)
+    assert not found.touches_edges and "step 2, further end relief over 3.00 mm: pinion 0.83 um" in str(found)
+    load = np.asarray(found.after["tolerance"].load.line_load[1])
+    # all stations of the ramp carry alike
+    place = np.flatnonzero(load > load.max() * (1 - 1e-9))
+    assert set(place) in ({0, 1, 2, 3}, {17, 18, 19, 20}) and found.after["tolerance"].edge_excess.max() < 1e-9
+    for line in (found.pinion, found.wheel):
+        assert [end.side for end in line.ends] == ["negative", "positive"] and float(line.crowning) == 0.0
+        np.testing.assert_allclose([end.length for end in line.ends], width)
+
+
+def test_end_reliefs_run_on_over_the_overhangs():
+    """On either gear they remove the same of the common face, whose relief is linear."""
+    line, y = FlankLine(3.0).further(8.0, 2.5), even_coordinates(WIDTH, STATIONS)
+    ramp = 3.0 * y / WIDTH + 8.0 * np.clip(1 - (0.5 * WIDTH - np.abs(y)) / 2.5, 0.0, None)
+    for gear, own in (("pinion", WIDE.pinion), ("wheel", WIDE.wheel)):
+        ground, middle = line.on(WIDE, gear), WIDE.face_middles[gear == "wheel"]
+        depth = ground.slope * (y + middle) / own.face_width
+        for end, sign in zip(ground.ends, (-1, 1)):
+            from_end = 0.5 * own.face_width - sign * (y + middle)
+            depth += end.amount * np.clip(1 - from_end / end.length, 0.0, None)
+        # up to what a slope takes off all of the common face
+        np.testing.assert_allclose(depth - np.mean(depth), ramp - np.mean(ramp), atol=1e-9)
+    shares = helix_slope_limits(WIDE, 6, end_relief=True) / helix_slope_limits(WIDE, 6)
+    np.testing.assert_allclose(shares, [30.0 / WIDTH, 1.0], rtol=1e-12)
+    np.testing.assert_allclose(iso_end_relief_width(WIDE), 0.1 * WIDTH)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("transform", [jax.jacfwd, jax.jacrev])
+@pytest.mark.parametrize("width", [2.5, 3.0])
+def test_the_least_end_relief_has_derivatives(transform, width):
+    def least(slope, width):
+        return least_off_the_edges(rigid_face(), FlankLineTolerance(slope), end_relief=width)
+
+    by_slope, by_width = transform(least, argnums=(0, 1))(jnp.asarray(12.0), jnp.asarray(width))
+    np.testing.assert_allclose([by_slope, by_width], [width / WIDTH, 12.0 / WIDTH], rtol=1e-6)
+
+
+@pytest.mark.slow
+def test_lives_in_cases_keep_the_end_reliefs():
+    line = FlankLine(2.0).further(6.0, 3.0)
+    given = flat(), DUTY, STRENGTH
+    level, *_ = lives_in_cases(*given, FlankLineTolerance(0.0), wheel=line, stations=STATIONS)
+    np.testing.assert_allclose(level, damage(*given, wheel=line, stations=STATIONS).life, rtol=1e-9)
+    assert float(level) < float(damage(*given, wheel=FlankLine(2.0), stations=STATIONS).life)
 
 
 @pytest.fixture(scope="module")
@@ -286,7 +344,7 @@ def test_a_load_that_is_not_found_is_not_level(face):
     face = eqx.tree_at(lambda face: face.of_support, face, jnp.int8(Status.SUPPORT_NOT_POSSIBLE))
     tolerance = flank_line_tolerance(SUPPORT.pair, 6, "class")
     line = level_load(face)
-    assert np.isnan([line.slope, line.crowning, crowning_off_the_edges(face, tolerance)]).all()
+    assert np.isnan([line.slope, line.crowning, least_off_the_edges(face, tolerance)]).all()
     cases = tolerance_cases(face, tolerance)
     assert cases.edge_contact.all() and np.isnan(cases.loaded_share).all() and np.isnan(cases.face_load_factor).all()
     with pytest.raises(ValueError, match="^the load over the face did not converge: "):
@@ -653,7 +711,11 @@ def test_hours_are_weights_with_a_duration():
         ),
         (lambda: layout_flank_lines(SUPPORT, TOLERANCE, further=-1.0), "further = -1 um must be"),
         (
-            lambda: crowning_off_the_edges(SUPPORT, TOLERANCE, share=0.0),
+            lambda: least_off_the_edges(rigid_face(), TOLERANCE, end_relief=0.4),
+            "end_relief = 0.4 mm must be greater than 0.428571 mm and at most 9 mm",
+        ),
+        (
+            lambda: least_off_the_edges(SUPPORT, TOLERANCE, share=0.0),
             "share = 0 must be greater than 0 and at most 1",
         ),
         (

@@ -68,6 +68,7 @@ PROFILE = """
 pinion_amounts = [10.0, 20.0]
 """
 ONE_PROFILE = PROFILE.replace(", 20.0", "") + "wheel_amounts = [10.0]\n"
+END_RELIEF = 'further = "end_relief"\n'
 AXES = "{ skew = 15.0, inclination = 30.0, bearing_span = 80.0 }"
 LIFE = """
 torques = [60.0, 150.0]
@@ -128,7 +129,7 @@ def test_the_command_compares_with_rigid_seats(file, tmp_path, two_torques):
     found, out = laid_out(file(two_torques), tmp_path / "out")
     housed, rigid = found["layouts"]["housing"], found["layouts"]["rigid seats"]
     assert housed["step_1"]["slope_um"] != pytest.approx(rigid["step_1"]["slope_um"], abs=0.01)
-    assert housed["further_crowning_um"] == pytest.approx(rigid["further_crowning_um"])
+    assert housed["further_amount_um"] == pytest.approx(rigid["further_amount_um"])
     assert f"{rigid['step_1']['slope_um']:.2f}" in out
     seats = {name: np.abs(each["seat_um"]).max() for name, each in found["bearings"]["housing"].items()}
     assert max(seats, key=seats.get) in ("A", "D")
@@ -190,7 +191,7 @@ def laid_out(path, folder, *quick):
     bare = main["unmodified_cases"]["maximum"]
     assert bare["face_load_factor"][0] == pytest.approx(main["face_load_factor"]["unmodified"])
     assert f"{max(bare['face_load_factor']):.3f}" in done.out and "unmodified / step 1 / step 2" in done.out
-    assert f"the least is {main['least_further_crowning_um']:.1f} um" in done.out
+    assert f"the least is {main['least_further_amount_um']:.1f} um" in done.out
     assert min(main["step_2_cases"]["maximum"]["life_h"]) == pytest.approx(crowned * main["life_h"][1])
     factor = main["face_load_factor"]["unmodified"]
     assert 1 < main["root_face_load_factor"]["unmodified"] < factor and "K_Fbeta, worst case" in done.out
@@ -358,6 +359,16 @@ misalignment = { direct = 5.0 }
     assert float(found.gearbox.meshes[1].misalignment.direct) == 5.0
 
 
+def test_step_2_may_add_end_reliefs(file):
+    """Their width is that of the standard, a tenth of the face, or given; the amounts are those of crowning here."""
+    texts = (FILE, replaced("stations = 21", 'stations = 21\nfurther = "end_relief"'))
+    texts = (*texts, texts[1] + 'end_relief_width = 2.5\nfurther_amount = "least"\n')
+    crowned, relieved, least = (LayoutStudy.of(load_design(file(text))).options for text in texts)
+    assert [one["end_relief"] for one in (crowned, relieved, least)] == [None, pytest.approx(1.8), 2.5]
+    np.testing.assert_allclose(relieved["further"], crowned["further"])
+    assert least["further"] is None
+
+
 def test_the_bearing_span_of_a_drawing_matters(file):
     """Of half the span twice the deviation is left over the face; by class no span is asked for."""
     texts = {span: replaced("span = 80.0", f"span = {span}") for span in ("40.0", "80.0")}
@@ -458,6 +469,16 @@ WRONG = [
     (
         replaced("stations = 21", "negative_crownin = true"),
         'layout.negative_crownin: unknown key, did you mean "negative_crowning"?',
+    ),
+    (FILE + "end_relief_width = 2.0\n", 'layout.end_relief_width: has no effect with further = "crowning"'),
+    (FILE + END_RELIEF + "end_relief_width = 9.5\n", "layout.end_relief_width: 9.5 mm must be at most 9 mm, half the"),
+    (
+        FILE + END_RELIEF + "end_relief_width = 0.4\n",
+        "layout.stations: the outermost is 0.857 mm wide, must be less than 0.8 mm, twice the width of the end relief",
+    ),
+    (
+        FILE + END_RELIEF + "end_relief_width = 1.0\n" + PROFILE,
+        "resolution.slices: the outermost is 3 mm wide, must be less than 2 mm",
     ),
     (replaced(f"misalignment = {AXES}", "bearing_span = 80.0"), "layout.bearing_span: has no effect without skew or"),
     (replaced("span = 80.0", "span = 17.0"), "misalignment.bearing_span: 17 mm must be at least 18 mm, the face width"),

@@ -1,7 +1,7 @@
 """Flank design across the face in three steps, for a mesh on its shafts.
 
 level_load, longest_life     1: helix slope and crowning, at a torque or for a duty cycle
-tolerance_cases              2: five cases of deviations, and the crowning that keeps the load off the edges
+tolerance_cases              2: five cases of deviations; crowning or end reliefs that keep the load off the edges
 layout_flank_lines           both together
 vary_profiles                3: profile modifications in all combinations
 flank_line_contact           the loaded tooth contact of the flank lines alone

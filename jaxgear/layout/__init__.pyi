@@ -3,9 +3,9 @@
 from .cases import CASES as CASES
 from .cases import FlankLineTolerance as FlankLineTolerance
 from .cases import ToleranceCases as ToleranceCases
-from .cases import crowning_off_the_edges as crowning_off_the_edges
 from .cases import flank_line_tolerance as flank_line_tolerance
 from .cases import helix_slope_limits as helix_slope_limits
+from .cases import least_off_the_edges as least_off_the_edges
 from .cases import lives_in_cases as lives_in_cases
 from .cases import tolerance_cases as tolerance_cases
 from .findings import layout_findings as layout_findings
@@ -13,6 +13,7 @@ from .flank_line import FlankLine as FlankLine
 from .flank_line import Stations as Stations
 from .flank_line import at_stations as at_stations
 from .flank_line import at_torque as at_torque
+from .flank_line import iso_end_relief_width as iso_end_relief_width
 from .flank_line import level_load as level_load
 from .life import Damage as Damage
 from .life import damage as damage

@@ -1,11 +1,12 @@
-"""Step 2 of a layout: what tolerances make of the load over the face and of the life, and the crowning against it.
+"""Step 2 of a layout: what tolerances make of the load over the face and of the life, and what is removed at the ends
+against it.
 
 References:
     U. Kissling's three-step layout of modifications: five cases of helix slope and axis deviations,
     equations 1 and 2; ISO 6336-1 Annexes B and E.
 
-Without deviations further crowning only gathers the load in the middle and shortens the life; what it saves, it saves
-where the flanks deviate.
+Without deviations further crowning or end relief only takes load off the ends and shortens the life; what it saves, it
+saves where the flanks deviate.
 """
 
 from collections.abc import Sequence
@@ -19,7 +20,20 @@ from jaxtyping import Array, Bool, Float
 from ..conditions import LoadSpectrum
 from ..geometry import GearPair
 from ..metrics.safety import Strength
-from ..numerics import Checked, Given, bracketed_root, check, concrete, maximum, number, program, real, result, whole
+from ..numerics import (
+    Checked,
+    Given,
+    bracketed_root,
+    check,
+    concrete,
+    maximum,
+    number,
+    optional_real,
+    program,
+    real,
+    result,
+    whole,
+)
 from ..shafts import AbstractSupport, FaceLoad, Misalignment, annex_e, axis_tolerance, face_load_factor
 from ..tolerance import ToleranceClass
 from .flank_line import STATIONS, FlankLine, Stations, at_stations
@@ -111,15 +125,17 @@ def _over_face(pair: GearPair, axes) -> list[Scalar]:
     return [axes.direct, share * axes.skew * jnp.cos(angle), share * axes.inclination * jnp.sin(angle)]
 
 
-def helix_slope_limits(pair: GearPair, quality_class: Classes) -> Float[Array, "2"]:
+def helix_slope_limits(pair: GearPair, quality_class: Classes, *, end_relief: bool = False) -> Float[Array, "2"]:
     """Further crowning C_b of pinion and wheel over the common face [um], that of equation 1 of the study.
 
-    Ground over its own face each has C_b = f_HbetaT; of a wider gear the common face has (common / own)^2 of that.
+    Ground over its own face each has C_b = f_HbetaT; of a wider gear the common face has (common / own)^2 of that. End
+    reliefs C_I(II) = f_HbetaT of gears with a modified flank line (ISO 6336-1 Annex B) have what the common face has
+    of the deviation, common / own.
     """
     classes = quality_class if isinstance(quality_class, tuple | list) else (quality_class, quality_class)
     return jnp.stack(
         [
-            ToleranceClass.of(gear, each).helix_slope * (pair.face_width / gear.face_width) ** 2
+            ToleranceClass.of(gear, each).helix_slope * (pair.face_width / gear.face_width) ** (1 if end_relief else 2)
             for gear, each in zip((pair.pinion, pair.wheel), classes)
         ]
     )
@@ -196,20 +212,21 @@ def _cases(face: Stations, tolerance: FlankLineTolerance, pinion: FlankLine, whe
     return ToleranceCases(tolerance.slopes, jax.vmap(at)(tolerance.slopes))
 
 
-def crowning_off_the_edges(
+def least_off_the_edges(
     support: AbstractSupport,
     tolerance: FlankLineTolerance,
     torque: Given | None = None,
     *,
     line: FlankLine | None = None,
     share: float = 1.0,
+    end_relief: Given | None = None,
     stiffness: Given | None = None,
     stations: int | None = None,
 ) -> Scalar:
-    """Smallest further crowning, of both gears together, with which no case touches an edge [um].
+    """Smallest further crowning or end relief, of both gears together, with which no case touches an edge [um].
 
     A case touches an edge where its largest line load is at an end of the face. That is what the study looks for in the
-    picture of all five cases; here the crowning is where the worst end station carries as much as the largest station
+    picture of all five cases; here the amount is where the worst end station carries as much as the largest station
     inside, or a share of that.
 
     Args:
@@ -218,27 +235,38 @@ def crowning_off_the_edges(
         torque: on the pinion [N m]; None for that of the couplings.
         line: flank line of step 1 over the common face, on either gear; None for none.
         share: of the largest load inside, up to which an end may be loaded.
+        end_relief: width of end reliefs of both ends over the common face [mm]; None for crowning.
         stiffness: c_gamma [N/(mm um)]; None for that of ISO 6336-1.
         stations: over the face; None for 41, or those that `Stations` have.
 
     Returns:
-        the crowning, 0 where none is needed; NaN where 16 times the sum of all deviations and of the opening by bent
+        the amount, 0 where none is needed; NaN where 16 times the sum of all deviations and of the opening by bent
         shafts are not enough, or the load has not been found. Differentiable.
+
+    Raises:
+        ValueError: for a share out of range, and for end reliefs that begin beyond the outermost stations or beyond the
+            middle of the face.
     """
     check("share", share, "", low=0.0, high=1.0, open_low=True)
     face = at_stations(support, torque, stations=stations)
-    return _off_the_edges(face, tolerance, line or FlankLine(), real(share), stiffness)
+    width = concrete(face.pair.face_width)
+    if width is not None:  # the outermost stations are half a station away from the ends
+        low, high = 0.5 * float(width) / face.count, 0.5 * float(width)
+        check("end_relief", end_relief, "mm", low=low, high=high, open_low=True)
+    return _off_the_edges(face, tolerance, line or FlankLine(), real(share), optional_real(end_relief), stiffness)
 
 
-def _worst_excess(crowning, given):
-    face, tolerance, line, share, stiffness = given
-    found = _cases(face, tolerance, FlankLine(), line.crowned(crowning).on(face.pair, "wheel"), stiffness)
+def _worst_excess(amount, given):
+    face, tolerance, line, share, end_relief, stiffness = given
+    found = _cases(face, tolerance, FlankLine(), line.further(amount, end_relief).on(face.pair, "wheel"), stiffness)
     return maximum(_excess(found.load.line_load, share))
 
 
 @program
-def _off_the_edges(face: Stations, tolerance: FlankLineTolerance, line: FlankLine, share, stiffness) -> Scalar:
-    given = face, tolerance, line, share, stiffness
+def _off_the_edges(
+    face: Stations, tolerance: FlankLineTolerance, line: FlankLine, share, end_relief, stiffness
+) -> Scalar:
+    given = face, tolerance, line, share, end_relief, stiffness
     bent = face.bent
     size = tolerance.helix_slope + tolerance.misalignment + jnp.max(bent) - jnp.min(bent)
     size = jax.lax.stop_gradient(_MOST * (size + jnp.abs(line.slope) + jnp.abs(line.crowning)))
@@ -295,7 +323,7 @@ def _lives(
 
     def life(slope):
         on_wheel = FlankLine(slope).on(pair, "wheel")
-        deviated = FlankLine(wheel.slope + on_wheel.slope, wheel.crowning + on_wheel.crowning)
+        deviated = FlankLine(wheel.slope + on_wheel.slope, wheel.crowning + on_wheel.crowning, wheel.ends)
         return damage_of(faces, load, strength, pinion, deviated).life
 
     return jax.vmap(life)(jnp.asarray(tolerance.slopes))

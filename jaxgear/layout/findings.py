@@ -40,10 +40,10 @@ LIMITS = {
         np.inf,
         "",
         f"more than {_COST:g} times that of unmodified flanks; compare the worst cases of deviations, and try "
-        'layout.further_crowning = "least"',
+        'layout.further_amount = "least"',
     ),
     "K_Hbeta of the worst case": Usual(
-        0.0, np.inf, "", 'no better than without the further crowning; try layout.further_crowning = "least"'
+        0.0, np.inf, "", 'no better than without step 2; try layout.further_amount = "least"'
     ),
     "slope and crowning in modules": Usual(
         0.0, 0.04, "", "above twice the tip relief of ISO 53:1974: are the units of bearings, shafts and housing right?"
@@ -93,7 +93,7 @@ def layout_findings(
         contact: K_Hbeta of the contact analysis in the five cases, by the names of the tolerance and of the step,
             "unmodified", "step 1" and "step 2"; None or empty without it.
     """
-    numbers = [*_of_load(layout), *_of_crowning(layout, contact or {}), *_of_flank_lines(layout), *_of_axes(layout)]
+    numbers = [*_of_load(layout), *_of_step_2(layout, contact or {}), *_of_flank_lines(layout), *_of_axes(layout)]
     if isinstance(support, ShaftSupport):
         gearbox, module = support.gearbox, float(layout.pair.pinion.module)
         mesh = gearbox.meshes[support.mesh]
@@ -118,7 +118,7 @@ def _of_load(layout: FlankLineLayout) -> Iterator[Finding]:
         yield _finding("K_Hbeta", where, factor, high=2 * stations / _FEWEST)
 
 
-def _of_crowning(layout: FlankLineLayout, contact: ContactCases) -> Iterator[Finding]:
+def _of_step_2(layout: FlankLineLayout, contact: ContactCases) -> Iterator[Finding]:
     """K_Hbeta after step 2, without deviations and in the worst case, by both analyses."""
     by_annex_e: _Factors = {
         f"{name} deviations": [of[name].face_load_factor for of in layout.cases] for name in layout.before
@@ -139,7 +139,8 @@ def _of_crowning(layout: FlankLineLayout, contact: ContactCases) -> Iterator[Fin
 
 def _of_flank_lines(layout: FlankLineLayout) -> Iterator[Finding]:
     for where, line, gear in zip(("pinion", "wheel"), (layout.pinion, layout.wheel), layout.pair.gears):
-        removed = abs(float(line.slope)) + abs(float(line.crowning))
+        amounts = line.slope, line.crowning, *(end.amount for end in line.ends[:1])
+        removed = sum(abs(float(amount)) for amount in amounts)
         yield _finding("slope and crowning in modules", where, 1e-3 * removed / float(gear.module))
 
 

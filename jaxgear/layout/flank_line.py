@@ -15,7 +15,7 @@ from jaxtyping import Array, Float
 
 from ..contact.status import Statuses
 from ..geometry import GearPair
-from ..microgeometry import AbstractModification, LeadCrowning, LeadSlope
+from ..microgeometry import AbstractModification, EndRelief, LeadCrowning, LeadSlope
 from ..numerics import (
     Checked,
     Given,
@@ -36,6 +36,7 @@ from ..shafts.mesh_support import even_coordinates
 Slices = Float[Array, " slices"]
 Scalar = Float[Array, ""]
 
+_SIDES: tuple[Literal["negative", "positive"], ...] = "negative", "positive"
 STATIONS = 41  # over the face, as many as `annex_e` has
 _SAME_TORQUE = 1e-6  # relative; single precision
 
@@ -181,34 +182,48 @@ GearName = Literal["pinion", "wheel"]
 
 
 class FlankLine(Checked):
-    """Helix slope and crowning of one gear over its own face, or of the gap over the common face of a pair.
+    """Helix slope, crowning and end reliefs of one gear over its own face, or of the gap over a pair's common face.
 
     Attributes:
         slope: C_H_beta, from end to end, removing material at positive face coordinates.
         crowning: C_beta, at both ends.
+        ends: linear end reliefs C_beta I and II, at the negative and at the positive end; empty for none.
     """
 
     slope: Scalar = number("um", default=0.0)
     crowning: Scalar = number("um", default=0.0)
+    ends: tuple[EndRelief, ...] = ()
 
     @property
     def modification(self) -> AbstractModification:
-        """Modification of the flank: slope and crowning."""
-        return LeadSlope(self.slope) + LeadCrowning(self.crowning)
+        """Modification of the flank: slope, crowning and end reliefs."""
+        return sum(self.ends, LeadSlope(self.slope) + LeadCrowning(self.crowning))
 
     def on(self, pair: GearPair, gear: GearName) -> "FlankLine":
         """A flank line of the gap, over the common face, as that of a gear over its own face.
 
-        Both open the common face alike, up to what they take off all of it.
+        Both open the common face alike, up to what they take off all of it. End reliefs run on over the overhangs.
         """
         own, common = getattr(pair, gear).face_width, pair.face_width
         middle = pair.face_middles[gear == "wheel"]
         slope = self.slope - 8 * self.crowning * middle / common
-        return FlankLine(slope * own / common, self.crowning * (own / common) ** 2)
+        ends = []
+        for end, overhang in zip(self.ends, pair.overhangs[gear == "wheel"]):
+            length = end.length + overhang
+            ends.append(EndRelief(end.amount * length / end.length, length, end.curve, end.side))
+        return FlankLine(slope * own / common, self.crowning * (own / common) ** 2, tuple(ends))
 
-    def crowned(self, further: Given) -> "FlankLine":
-        """With so much crowning on top [um]."""
-        return FlankLine(self.slope, self.crowning + further)
+    def further(self, amount: Given, end_relief: Given | None = None) -> "FlankLine":
+        """With so much more removed at both ends [um]: by end reliefs of a width [mm], by crowning for None."""
+        if end_relief is None:
+            return FlankLine(self.slope, self.crowning + amount, self.ends)
+        ends = tuple(EndRelief(real(amount), real(end_relief), side=side) for side in _SIDES)
+        return FlankLine(self.slope, self.crowning, ends)
+
+
+def iso_end_relief_width(pair: GearPair) -> Scalar:
+    """Width of end reliefs by ISO 6336-1 Annex B [mm]: a tenth of the face, at most a normal module."""
+    return jnp.minimum(0.1 * pair.face_width, pair.pinion.module)
 
 
 def level_load(
@@ -278,4 +293,4 @@ def _level(face: Stations, stiffness, negative_crowning: bool) -> FlankLine:
         alone, concave = best((slope,)), line.crowning < 0
         line = FlankLine(jnp.where(concave, alone[0], line.slope), jnp.where(concave, 0.0, line.crowning))
     found = loaded(line).converged
-    return FlankLine(*(jnp.where(found, amount, jnp.nan) for amount in (line.slope, line.crowning)))
+    return FlankLine(jnp.where(found, line.slope, jnp.nan), jnp.where(found, line.crowning, jnp.nan))

@@ -146,7 +146,7 @@ def vary_profiles(
 
     Args:
         mesh: prepared mesh with slices: over shafts, the flank lines are those of the first two steps; without them,
-            what is left of the flank lines where they have levelled the load, the further crowning.
+            what is left of the flank lines where they have levelled the load, that of step 2.
         torque: on the pinion [N m].
         flank_lines: modifications of pinion and wheel, in every variant.
         pinion_amounts, wheel_amounts: of the modification [um], crossed with each other.

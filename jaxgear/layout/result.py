@@ -121,9 +121,12 @@ class LayoutResult(AbstractStudyResult):
         """Lines that describe the layout."""
         layout = self.main
         for name, line in (("pinion", layout.pinion), ("wheel", layout.wheel)):
-            yield f"flank line of the {name}: slope {float(line.slope):.1f} um, crowning {float(line.crowning):.1f} um"
+            amounts = f"slope {float(line.slope):.1f} um, crowning {float(line.crowning):.1f} um"
+            ends = dict.fromkeys(f"{float(end.amount):.1f} um x {float(end.length):.2f} mm" for end in line.ends)
+            yield f"flank line of the {name}: {amounts}" + (f", end relief {' and '.join(ends)}" if ends else "")
         added = float(np.sum(layout.further))
-        yield f"further crowning of step 2: {added:.1f} um on both together, the least is {float(layout.needed):.1f} um"
+        least = f"the least is {float(layout.needed):.1f} um"
+        yield f"further {layout.means} of step 2: {added:.1f} um on both together, {least}"
         if layout.damage:
             before, _, after = np.asarray(layout.relative_life)
             yield f"life relative to the even load: {before:.2f} without modification, {after:.2f} after step 2"
@@ -261,8 +264,8 @@ class LayoutResult(AbstractStudyResult):
                 *_factors("  {}", 1),
             ],
             [
-                _record("step 2, pinion: crowning C_b [um]", lambda of: of.further[0], ".2f"),
-                _record("step 2, wheel: crowning C_b [um]", lambda of: of.further[1], ".2f"),
+                _record(f"step 2, pinion: {self.main.means}, C_b [um]", lambda of: of.further[0], ".2f"),
+                _record(f"step 2, wheel: {self.main.means}, C_b [um]", lambda of: of.further[1], ".2f"),
                 _record("  least of both together [um]", lambda of: of.needed, ".2f"),
             ],
             *([*_cases(name, tolerance, lives=wears)] for name, tolerance in self.tolerances.items()),
@@ -365,7 +368,11 @@ def _layout(layout: FlankLineLayout) -> dict[str, Any]:
     hours = UnitKey("life", "h")
 
     def line(of: FlankLine) -> dict[UnitKey, Any]:
-        return {UnitKey("slope", "um"): of.slope, UnitKey("crowning", "um"): of.crowning}
+        ends = {
+            UnitKey("end_relief", "um"): [end.amount for end in of.ends],
+            UnitKey("end_relief_width", "mm"): [end.length for end in of.ends],
+        }
+        return {UnitKey("slope", "um"): of.slope, UnitKey("crowning", "um"): of.crowning, **(ends if of.ends else {})}
 
     def cases(of: Mapping[str, ToleranceCases], step: int) -> dict[str, Any]:
         return {
@@ -389,8 +396,9 @@ def _layout(layout: FlankLineLayout) -> dict[str, Any]:
         UnitKey("torque", "N m"): layout.torque,
         "gear": layout.gear,
         "step_1": line(layout.line),
-        UnitKey("further_crowning", "um"): layout.further,
-        UnitKey("least_further_crowning", "um"): layout.needed,
+        "further": layout.means,
+        UnitKey("further_amount", "um"): layout.further,
+        UnitKey("least_further_amount", "um"): layout.needed,
         "pinion": line(layout.pinion),
         "wheel": line(layout.wheel),
         "face_load_factor": dict(zip(("unmodified", "step_1"), factors)),

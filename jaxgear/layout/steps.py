@@ -12,13 +12,13 @@ from ..conditions import LoadSpectrum
 from ..geometry import GearPair
 from ..metrics.safety import Strength
 from ..microgeometry import AbstractModification
-from ..numerics import Checked, Given, Numbers, check, real, result
+from ..numerics import Checked, Given, Numbers, check, optional_real, real, result
 from ..shafts import AbstractSupport, ShaftSupport, annex_e
 from .cases import (
     CASES,
     FlankLineTolerance,
     ToleranceCases,
-    crowning_off_the_edges,
+    least_off_the_edges,
     lives_in_cases,
     tolerance_cases,
 )
@@ -37,6 +37,7 @@ class FlankLineLayout(Checked):
         pair: the gears.
         line: of step 1, over the common face.
         further: C_b of step 2 on pinion and wheel, on top of step 1, over the common face.
+        end_relief: width of the end reliefs of step 2, over the common face; None for crowning.
         needed: C_b of both together, without which a case touches an edge.
         factors: K_Hbeta without modification and after step 1, both without deviations.
         unmodified, before, after: the five cases without modification, with the flank line of step 1 alone, and with
@@ -52,6 +53,7 @@ class FlankLineLayout(Checked):
     pair: GearPair
     line: FlankLine
     further: Float[Array, "2"] = result("um")
+    end_relief: Scalar | None = result("mm")
     needed: Scalar = result("um")
     factors: Float[Array, "2"] = result()
     unmodified: dict[str, ToleranceCases]
@@ -59,6 +61,11 @@ class FlankLineLayout(Checked):
     after: dict[str, ToleranceCases]
     damage: tuple[Damage, ...] = ()
     lives: dict[str, Float[Array, "steps cases"]] = eqx.field(default_factory=dict)
+
+    @property
+    def means(self) -> str:
+        """Modification of step 2, crowning or end relief over its width."""
+        return "crowning" if self.end_relief is None else f"end relief over {float(self.end_relief):.2f} mm"
 
     @property
     def pinion(self) -> FlankLine:
@@ -115,14 +122,14 @@ class FlankLineLayout(Checked):
 
     def _line(self, gear: GearName, index: int) -> FlankLine:
         own = self.line if self.gear == gear else FlankLine()
-        return own.crowned(self.further[index]).on(self.pair, gear)
+        return own.further(self.further[index], self.end_relief).on(self.pair, gear)
 
     def __str__(self) -> str:
         before, after = (f"{float(value):.3f}" for value in self.factors)
         lines = [
             f"layout at {float(self.torque):g} N m: K_Hbeta {before}, {after} after step 1",
             f"step 1, {self.gear}: slope {float(self.line.slope):.2f} um, crowning {float(self.line.crowning):.2f} um",
-            "step 2, further crowning: pinion {:.2f} um, wheel {:.2f} um".format(*map(float, self.further)),
+            "step 2, further {}: pinion {:.2f} um, wheel {:.2f} um".format(self.means, *map(float, self.further)),
             f"{'K_Hbeta':24}" + "".join(f"{name:>14}" for name in CASES),
         ]
         for step, of in zip(("unmodified", "step 1", "step 2"), self.cases):
@@ -142,6 +149,7 @@ def layout_flank_lines(
     strength: Strength | None = None,
     gear: GearName = "wheel",
     further: Numbers | None = None,
+    end_relief: Given | None = None,
     share: float = 1.0,
     negative_crowning: bool = False,
     stations: int = STATIONS,
@@ -149,10 +157,11 @@ def layout_flank_lines(
     """Steps 1 and 2 of the layout of a mesh.
 
     Step 1 levels the load at the torque (`level_load`), or finds the longest life under a duty cycle (`longest_life`).
-    Step 2 adds crowning to both gears so that the largest load of none of the five cases is at an edge: the given
-    amounts, C_b = f_HbetaT of either gear over its own face after equation 1 of the study and ISO 6336-1 Annex B
-    (`helix_slope_limits`), and more in proportion where they do not suffice; without any, as little as it takes, half
-    of it on either gear.
+    Step 2 adds crowning or end reliefs to both gears so that the largest load of none of the five cases is at an edge:
+    the given amounts, C_b = f_HbetaT of either gear over its own face after equation 1 of the study and ISO 6336-1
+    Annex B (`helix_slope_limits`), and more in proportion where they do not suffice; without any, as little as it
+    takes, half of it on either gear. The least end relief leaves the
+    largest load where it begins.
 
     Args:
         support: shafts at the mesh, `support` of a gearbox or `RigidSupport`.
@@ -162,13 +171,15 @@ def layout_flank_lines(
         strength: of the gears under it, as for `damage`.
         gear: whose flank line levels the load.
         further: C_b of pinion and wheel over the common face [um]; None for as little as it takes.
+        end_relief: width of end reliefs over the common face [mm], for instance `iso_end_relief_width`; None for
+            crowning.
         share: of the largest load inside, up to which an end may be loaded.
         negative_crowning: whether the crowning of step 1 may be negative.
         stations: over the face.
 
     Raises:
         ValueError: for a duty cycle without strength or the reverse, another gear, amounts or numbers out of range,
-            where the load over the face is not found, and where no crowning keeps it off the edges.
+            where the load over the face is not found, and where no amount keeps it off the edges.
     """
     if gear not in ("pinion", "wheel"):
         raise ValueError(f'gear = {gear!r} must be "pinion" or "wheel"')
@@ -186,14 +197,15 @@ def layout_flank_lines(
         line = level_load(face, negative_crowning=negative_crowning)
     else:
         line = longest_life(support, duty_cycle, strength, negative_crowning=negative_crowning, stations=stations)
-    each = [crowning_off_the_edges(face, one, line=line, share=share) for one in several.values()]
+    each = [least_off_the_edges(face, one, line=line, share=share, end_relief=end_relief) for one in several.values()]
     needed = jnp.max(jnp.stack(each))
     if not bool(jnp.isfinite(line.slope)):
         raise ValueError("the load over the face did not converge: do the loads leave a shaft loose in its clearances?")
     if not bool(jnp.isfinite(needed)):
-        raise ValueError("no crowning keeps the load off the edges: the shafts are too soft")
+        removed = "crowning" if end_relief is None else "end relief"
+        raise ValueError(f"no {removed} keeps the load off the edges: the shafts are too soft")
     added = _further(needed, further)
-    on_wheel, crowned = (each.on(face.pair, "wheel") for each in (line, line.crowned(jnp.sum(added))))
+    on_wheel, crowned = (each.on(face.pair, "wheel") for each in (line, line.further(jnp.sum(added), end_relief)))
     steps = FlankLine(), on_wheel, crowned
     unmodified, before, after = (
         {name: tolerance_cases(face, one, wheel=wheel) for name, one in several.items()} for wheel in steps
@@ -204,6 +216,7 @@ def layout_flank_lines(
         pair=face.pair,
         line=line,
         further=added,
+        end_relief=optional_real(end_relief),
         needed=needed,
         factors=jnp.stack(
             [

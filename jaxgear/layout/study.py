@@ -31,8 +31,9 @@ _TORQUES, _QUICK_TORQUES = 25, 7  # over the range of the file
 class LayoutStudy(AbstractStudy[LayoutResult]):
     """Find the flank lines of the pair on its shafts, and its profile modifications, in three steps.
 
-    Step 1 levels the load over the face or finds the longest life under a duty cycle. Step 2 adds crowning so that the
-    face ends carry no excess load within the tolerances. Step 3 evaluates all combinations of profile modifications.
+    Step 1 levels the load over the face or finds the longest life under a duty cycle. Step 2 adds crowning or end
+    reliefs so that the face ends carry no excess load within the tolerances. Step 3 evaluates all combinations of
+    profile modifications.
     The command computes every step with and without the housing.
 
     Attributes:
@@ -230,8 +231,8 @@ def _held(support: ShaftSupport, torque: float, size: Resolution) -> AbstractSup
 def _profile(
     study: LayoutStudy, wanted: ProfileSection, mesh: Mesh, layout: FlankLineLayout, stages: Stages
 ) -> ProfileLayout:
-    """Step 3 on the flank lines; if step 1 has levelled the load, on the further crowning of step 2 alone."""
-    for_pinion, for_wheel = (FlankLine(crowning=amount) for amount in layout.further)
+    """Step 3 on the flank lines; on shafts that step 1 has compensated, on what step 2 adds alone."""
+    for_pinion, for_wheel = (FlankLine().further(amount, layout.end_relief) for amount in layout.further)
     left = for_pinion.on(layout.pair, "pinion").modification, for_wheel.on(layout.pair, "wheel").modification
     return vary_profiles(
         mesh,

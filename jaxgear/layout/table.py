@@ -15,6 +15,7 @@ from ..io.value_types import QUALITY_CLASSES, choice, count, either, list_of, po
 from ..numerics import Number
 from ..shafts import Misalignment
 from .cases import FlankLineTolerance, flank_line_tolerance, helix_slope_limits
+from .flank_line import iso_end_relief_width
 
 _AMOUNTS = list_of(real(Number("um", low=0.0)))
 _FURTHER = list_of(real(Number("um")))
@@ -88,8 +89,11 @@ class LayoutSection(FurtherTable):
             without it.
         gear: gear with the flank line that levels the load.
         direction: sense of rotation of the first shaft, seen against z.
-        further_crowning: "rule" takes C_b = f_Hbeta of ISO 6336-1 Annex B for both gears and more where that does not
-            suffice; "least" takes the least crowning that keeps the load off the edges.
+        further: what step 2 adds to both gears so that the load stays off the edges, "crowning" or "end_relief".
+        further_amount: "rule" takes C_b = f_Hbeta of ISO 6336-1 Annex B for both gears and more where that does not
+            suffice; "least" takes the least that keeps the load off the edges.
+        end_relief_width: width of the end reliefs over the common face; a tenth of it, at most a normal module (ISO
+            6336-1 Annex B), without it.
         edge_share: permissible line load at an end of the face, as a share of the largest one inside.
         negative_crowning: True if the crowning of step 1 may be negative.
         stations: number of stations over the face in the analysis of ISO 6336-1 Annex E.
@@ -107,7 +111,9 @@ class LayoutSection(FurtherTable):
     misalignment: str | Template | None = entry(_AXES)
     gear: str = entry(choice("pinion", "wheel"), "wheel")
     direction: str = entry(choice("counterclockwise", "clockwise"), "counterclockwise")
-    further_crowning: str = entry(choice("rule", "least"), "rule")
+    further: str = entry(choice("crowning", "end_relief"), "crowning")
+    further_amount: str = entry(choice("rule", "least"), "rule")
+    end_relief_width: float | None = entry(positive("mm"))
     edge_share: float = entry(real(Number(low=0.0, high=1.0, open_low=True)), 1.0)
     negative_crowning: bool = entry(switch(), False)
     stations: int = entry(count(5, 1001), 41)
@@ -130,6 +136,7 @@ class LayoutSection(FurtherTable):
             raise DesignFileError("layout", "has no effect without [[shafts]]")
         _axes(self.misalignment, float(design.pair().face_width))
         self.duty_cycle(design)
+        self._end_relief(design)
         if self.profile is not None:
             self.profile.variants()
 
@@ -166,16 +173,38 @@ class LayoutSection(FurtherTable):
 
     def options(self, design: DesignFile) -> dict[str, Any]:
         """Keyword arguments of `layout_flank_lines`."""
-        load = self.duty_cycle(design)
-        limits = helix_slope_limits(design.pair(), both_classes(self.quality_class))
+        load, relieved = self.duty_cycle(design), self.further == "end_relief"
+        limits = helix_slope_limits(design.pair(), both_classes(self.quality_class), end_relief=relieved)
         return {
             "gear": self.gear,
-            "further": limits if self.further_crowning == "rule" else None,
+            "further": limits if self.further_amount == "rule" else None,
+            "end_relief": self._end_relief(design),
             "share": self.edge_share,
             "negative_crowning": self.negative_crowning,
             "stations": self.stations,
             **({} if load is None else {"duty_cycle": load, "strength": design.tables["strength"]}),
         }
+
+    def _end_relief(self, design: DesignFile) -> float | None:
+        """Width of the end reliefs [mm], within which the outermost stations and slices must lie; None for crowning."""
+        if self.further == "crowning":
+            self.refuse(["end_relief_width"], ' with further = "crowning"')
+            return None
+        pair = design.pair()
+        face, width = float(pair.face_width), self.end_relief_width or float(iso_end_relief_width(pair))
+        outermost = {"layout.stations": face / self.stations}
+        if self.profile is not None:
+            first, second, *_ = design.resolution().slice_edges
+            outermost["resolution.slices"] = face * float(second - first)
+        for key, size in outermost.items():
+            if width <= 0.5 * size:
+                problem = f"the outermost is {size:.3g} mm wide, must be less than {2 * width:.3g} mm"
+                raise DesignFileError(key, f"{problem}, twice the width of the end relief")
+        if width > 0.5 * face:
+            raise DesignFileError(
+                "layout.end_relief_width", f"{width:g} mm must be at most {0.5 * face:g} mm, half the face"
+            )
+        return width
 
     @classmethod
     def inner(cls) -> dict[str, type[FileTable]]:
