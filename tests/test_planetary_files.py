@@ -13,6 +13,7 @@ from jaxgear.io.named_quantities import quantity_named
 from jaxgear.metrics import Analysis
 from jaxgear.numerics import changed
 from jaxgear.planetary.table import StageSection
+from jaxgear.studies.export import ExportStudy
 
 STAGE = f"""
 [sun]
@@ -197,3 +198,14 @@ def test_vibration_of_a_stage_needs_the_inertia_of_its_carrier(tmp_path):
     soft = "planets = 4\ncarrier_support = 100.0\ncarrier_inertia = 0.1"
     with pytest.raises(DesignFileError, match=r"stage\.carrier_mass: missing"):
         load(tmp_path, BARE.replace("planets = 4", soft))
+
+
+def test_what_knows_a_pair_alone_says_so(tmp_path):
+    """A study of the mesh of sun and planet tells it, and no other format takes it for the stage."""
+    design = load(tmp_path)
+    assert ExportStudy.of(design).omits().startswith("the mesh of sun and planet alone")
+    result = CliRunner().invoke(app, ["convert", str(design.path), str(tmp_path / "stage.rexs")])
+    assert isinstance(result.exception, DesignFileError) and "stage: REXS is written of single pairs" in str(
+        result.exception
+    )
+    assert not (tmp_path / "stage.rexs").exists()

@@ -62,6 +62,7 @@ class FurtherTable(FileTable):
         direction: sense of rotation of the first shaft, where the table has such a key.
         shown: names of the quantities of the table that every analysis of a design gives.
         called: what a file with the table calls tables of the pair, by the names that these have without it.
+        whole: what the pair is a part of, in words, for studies of the pair alone; "" for a pair.
     """
 
     drive_only: ClassVar[bool] = False
@@ -69,6 +70,7 @@ class FurtherTable(FileTable):
     direction: str | None = None
     shown: ClassVar[tuple[str, ...]] = ()
     called: ClassVar[Mapping[str, str]] = {}
+    whole: ClassVar[str] = ""
 
     @classmethod
     def read(cls, given: Mapping[str, Any], folder: Path) -> Self:

@@ -81,6 +81,7 @@ class StageSection(FurtherTable, section_of(PlanetaryStage, ("gears",), open=Fal
     table = "stage"
     drive_only = True
     called = {"pinion": "sun", "wheel": "planet"}
+    whole = "the mesh of sun and planet alone, under its share of the load: [stage] is not part of this analysis"
 
     pin_tolerance: float | None = entry(positive("um"))
     pin_samples: int = entry(count(2, _MOST_SAMPLES), _SAMPLES)

@@ -211,7 +211,8 @@ class AbstractStudy(abc.ABC, Generic[R]):
 
     def omits(self) -> str:
         """Message naming the tables of the file, shafts excepted, that the study ignores, and why; "" for none."""
-        return manufactured.left_out(self.design)
+        wholes = [getattr(table, "whole", "") for table in self.design.tables.values()]
+        return "; ".join(line for line in (manufactured.left_out(self.design), *wholes) if line)
 
     @property
     def left_out(self) -> str:
