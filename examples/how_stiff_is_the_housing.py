@@ -2,8 +2,9 @@
 
 scikit-fem (`pip install scikit-fem`) makes a three-dimensional model of an open box: a bottom, four walls, an opening
 for each of the four bearings. Its stiffness matrix is condensed onto the seats and written as the CSV file that
-`read_housing` takes, just as any other finite-element program could write it. Then the bearing displacements and the
-load over the face follow: on rigid seats, in the box on a good foundation, and on one that is missing under a corner.
+`read_housing` takes: matrices of other finite-element programs have to be brought into it, their own files are not
+read. Then the bearing displacements and the load over the face follow: on rigid seats, in the box on a good foundation,
+and on one that is missing under a corner.
 Run it: `python examples/how_stiff_is_the_housing.py`.
 """
 

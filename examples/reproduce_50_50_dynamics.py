@@ -189,7 +189,7 @@ def show(found) -> None:
         if why and why not in said:
             said.add(why)
             print(textwrap.fill(why, 100, initial_indent="    ", subsequent_indent="    "))
-    for line in (*over_torque(found), *above_unmodified(found)):
+    for line in (*over_torque(found), *below_published(found), *above_unmodified(found)):
         print(line)
 
 
@@ -200,6 +200,19 @@ def over_torque(found):
         if f"{key} K_v" in found:
             factor, rms = ("-" if value is None else f"{value:.4g}" for value in published)
             yield f"{key:24}{factor:>16}{found[f'{key} K_v']:10.4g}{rms:>24}{found[f'{key} q_rms']:10.4g}"
+
+
+def below_published(found):
+    """How many numbers of the relieved gears are lower here than in the study."""
+    pairs = [
+        (found[f"{key} {what}"], value)
+        for key, published in PUBLISHED.items()
+        if f"{key} K_v" in found and not key.endswith("unmodified")
+        for what, value in zip(("K_v", "q_rms"), published)
+        if value is not None
+    ]
+    lower = sum(here < value for here, value in pairs)
+    yield f"\nOf the {len(pairs)} largest K_v and q_rms of relieved gears {lower} are lower here than in the study."
 
 
 def above_unmodified(found):

@@ -3,7 +3,9 @@
 U. Kissling lays out the flanks of a two-stage gearbox in three steps: level the load over the face, keep it off the
 edges within the tolerances, then vary profile modifications; without housing, in a housing on a good foundation, and on
 a bad one under the intermediate shaft. The study prints results but neither gears nor shafts nor matrices, and its
-gears are helical: this spur gearbox is made up in its manner, and its trends are what can be reproduced.
+gears are helical: this spur gearbox is made up in its manner, and its trends are what can be reproduced. Step 3 crosses
+long tip reliefs around the amount of ISO 6336-1; the study crosses profile crownings around that of a rule by Niemann,
+which it does not print.
 
     K_Hbeta without modification, and after step 1      the study: 1.016 and 1.012 by its tool, then 1.00 by hand
     its largest value within tolerances after step 1    1.23 (statistical) to 1.36 (maximum), load at the edges
