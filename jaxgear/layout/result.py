@@ -112,7 +112,7 @@ class LayoutResult(AbstractStudyResult):
         pinion, wheel = self.main.modifications
         found = {"step 1": (first[0].modification, first[1].modification), "step 2": (pinion, wheel)}
         if self.profile is not None:
-            # the profile was made on the further crowning, which the flank line has as well
+            # the profile was made on the flank lines of step 2, or on what that step adds
             of_pinion, of_wheel = self.profile.profiles
             found["step 3"] = pinion + of_pinion, wheel + of_wheel
         return found

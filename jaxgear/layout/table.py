@@ -38,7 +38,7 @@ class ProfileSection(FileTable):
             (long relief) without it.
         torque_factor: torque of the contact analysis, in design torques.
         shafts: whether the contact analysis includes shafts, bearings and housing, with the flank lines of both steps
-            and once for every support. Without them the flanks have the further crowning alone, as on shafts whose
+            and once for every support. Without them the flanks have what step 2 adds alone, as on shafts whose
             deflection is compensated.
     """
 
