@@ -209,3 +209,14 @@ def test_what_knows_a_pair_alone_says_so(tmp_path):
         result.exception
     )
     assert not (tmp_path / "stage.rexs").exists()
+
+
+def test_tilted_pins_need_slices(tmp_path):
+    """Both meshes then have as many, and the flanks that carry with the ring have a key of their own."""
+    tilted = load(tmp_path, BARE.replace("planets = 4", "planets = 4\ntangential_pin_tilt = [0.1, 0.1, 0.1, 0.1]"))
+    assert tilted.resolution().slices > 1
+    coast = '\n[[planet.coast_modification]]\ntype = "tip_relief"\namount = 2.0\nlength = 3.0\n'
+    with pytest.raises(
+        DesignFileError, match=r"planet\.coast_modification: has no effect with \[stage\]: planet\.ring"
+    ):
+        load(tmp_path, BARE + coast)

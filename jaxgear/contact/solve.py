@@ -432,7 +432,8 @@ def outermost(mesh: Mesh, removed: RemovedMaterial) -> Curve:
     amount, gain = removed.amount, _sliding_gain(mesh, removed.shift)
     edge = jnp.stack([amount[-1, :, 0], amount[0, :, -1]])
     fall = jnp.minimum(edge - jnp.stack([amount[-1, :, 1], amount[0, :, -2]]), 0.0)
-    excess = 2 * jnp.minimum(minimum(amount, axis=(0, 1, 2)), 0.0)
+    # positions without a solution, NaN, say nothing of the others
+    excess = 2 * jnp.min(jnp.where(jnp.isnan(amount), 0.0, amount), initial=0.0)
     left = jnp.maximum(edge - 2 * gain, excess)[..., None] + fall[..., None] * _outer_steps(mesh)
     if mesh.support_gap is not None:
         left = left + mesh.outer_lever * mesh.support_gap[None, :, None]

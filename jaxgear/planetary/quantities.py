@@ -133,7 +133,8 @@ class StageSettings(AbstractSettings):
             with_errors = replace(stage, tangential_pin_error=errors if own is None else own + errors)
             return _solved(replace(self.prepared, stage=with_errors), analysis)
 
-        return analysis.once(self, "stages with errors", lambda: jax.vmap(of)(errors))
+        # one after the other: side by side they would take the memory of as many batches of designs
+        return analysis.once(self, "stages with errors", lambda: jax.lax.map(of, errors))
 
 
 def _solved(prepared: PreparedStage, analysis: Analysis) -> StageCycle:

@@ -6,7 +6,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Complex, Float
 
 from ..dynamics.oscillator import NEWTON
-from ..numerics import Checked, Given, check, maximum, minimum, program, real, result, whole
+from ..numerics import Checked, Given, check, maximum, minimum, program, real, result, solve_dense, whole
 from .cycle import StageCycle
 from .vibration import StageSystem
 
@@ -143,7 +143,7 @@ def _response(
     square = ((2 * jnp.pi * orders[None] * frequencies[:, None]) ** 2).astype(spring.dtype)
     dynamic = stiffness[None, None] - square[..., None, None] * mass[None, None]
     loads = jnp.broadcast_to(load, (*square.shape, load.shape[-1]))
-    motion = jnp.linalg.solve(dynamic, loads[..., None])[..., 0]
+    motion = jax.vmap(jax.vmap(_complex_solution))(dynamic, loads)
     met = jnp.einsum("sic,flc->fsil", along, motion) - displaced[None]
     pins = None
     if system.of_pins is not None:
@@ -158,3 +158,13 @@ def _response(
         mean_force=jnp.mean(force, axis=-1),
         names=system.names,
     )
+
+
+def _complex_solution(
+    matrix: Complex[Array, "coordinates coordinates"], right: Complex[Array, " coordinates"]
+) -> Complex[Array, " coordinates"]:
+    """Solution of complex equations, by their real and imaginary parts."""
+    real_part, imaginary = matrix.real, matrix.imag
+    both = jnp.block([[real_part, -imaginary], [imaginary, real_part]])
+    found = solve_dense(both, jnp.concatenate([right.real, right.imag]))
+    return jax.lax.complex(found[: len(right)], found[len(right) :])

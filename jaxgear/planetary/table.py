@@ -38,6 +38,7 @@ _TORQUES = 9  # over the range of the file
 _FEWEST_POSITIONS = 16  # a multiple of it and of the number of planets
 # tables that the mesh of planet and ring has in common with that of sun and planet
 _SHARED = "title", "materials", "model", "resolution"
+_TILTS = "radial_pin_tilt", "tangential_pin_tilt", "pin_tilt_compliance"
 _WITHOUT_VARIABLES = "variables", "stage", "type", "curve"
 _LEFT_OUT = "tolerance", "misalignment", "shafts", "teeth", "layout", "wear", "dynamics", "rating"
 
@@ -107,6 +108,12 @@ class StageSection(FurtherTable, section_of(PlanetaryStage, ("gears",), open=Fal
         for name in _LEFT_OUT:
             if name in content:
                 raise DesignFileError(cls.table, f"has no effect with [{name}], which knows a single pair")
+        for name in _GEARS:
+            if isinstance(content[name], dict) and "coast_modification" in content[name]:
+                problem = (
+                    "has no effect with [stage]: planet.ring_modification is of the flanks that carry with the ring"
+                )
+                raise DesignFileError(f"{name}.coast_modification", problem)
         pair = {name: table for name, table in content.items() if name not in _GEARS}
         planet = content["planet"]
         if isinstance(planet, dict):
@@ -187,6 +194,10 @@ class StageSection(FurtherTable, section_of(PlanetaryStage, ("gears",), open=Fal
         if self.carrier_inertia is not None and self.carrier_support is not None and self.carrier_mass is None:
             raise DesignFileError("stage.carrier_mass", "missing, the support of the carrier is not rigid")
 
+    def varies_along_face(self) -> list[str]:
+        """The tilts of pins, which lean the flanks of every mesh."""
+        return [self.key] if any(name in self.fields for name in _TILTS) else []
+
     def quantity(self, design: DesignFile, key: str, quantity: Quantity) -> Quantity:
         """A quantity of the stage."""
         if quantity.name.endswith(WITH_ERRORS) and self.pin_tolerance is None:
@@ -209,10 +220,12 @@ class StageSection(FurtherTable, section_of(PlanetaryStage, ("gears",), open=Fal
             return self._made[1]
         stage = self._stage(design, self._outer)
         step = math.lcm(_FEWEST_POSITIONS, stage.planets)
+        sizes = {"sun": design.resolution(), "ring": self._outer.resolution()}
+        slices = max(each.slices for each in sizes.values()) if self.varies_along_face() else None
         meshes = {}
         for name, each in (("sun", design), ("ring", self._outer)):
-            sizes = each.resolution()
-            meshes[name] = each.mesh(replace(sizes, positions=step * -(-sizes.positions // step)))
+            own = replace(sizes[name], positions=step * -(-sizes[name].positions // step))
+            meshes[name] = each.mesh(own if slices is None else replace(own, slices=slices))
         lubricant = design.tables.get("lubricant")
         made = StageSettings(
             prepare_stage(stage, **meshes), self._pin_errors(stage.planets), lubricant, self._inertias(design)

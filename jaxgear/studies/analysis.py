@@ -69,7 +69,12 @@ class ComparisonRun:
         self._mesh: Mesh = jax.block_until_ready(self.design.mesh(coarse(size) if self._quick else size))
         self._searched_at = self._mesh.resolution.positions
         self._torques = torques_of(self.design, quick=self._quick)
-        if verify or (verify is None and isinstance(self._mesh.compliance, Compliance)):
+        whole = next((name for name, of in self.design.tables.items() if getattr(of, "whole", "")), "")
+        if whole:  # its quantities would be verified by nothing
+            self._unverified = f"finite-element structures are of pairs, [{whole}] is more than one"
+            if verify:
+                raise DesignFileError("optimize.verify", self._unverified, self.design.path)
+        elif verify or (verify is None and isinstance(self._mesh.compliance, Compliance)):
             self._make_tables(finer, required=verify is not None)
 
     def _make_tables(self, finer: int | None, *, required: bool) -> None:
