@@ -35,7 +35,7 @@ state = State()
 @contextmanager
 def listening() -> Iterator[None]:
     """Handle both signals during a block; changes nothing outside the main thread."""
-    state.requested, state.delayed, state.written, state.before = False, False, NOTHING, None
+    _forget()
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -46,6 +46,7 @@ def listening() -> Iterator[None]:
     finally:
         sys.unraisablehook = hook
         _restore()
+        _forget()  # what a Python program runs next was not interrupted
 
 
 @contextmanager
@@ -85,6 +86,10 @@ def delayed(then: str) -> Iterator[None]:
     finally:
         state.delayed = False
     check()
+
+
+def _forget() -> None:
+    state.requested, state.delayed, state.written, state.before = False, False, NOTHING, None
 
 
 def _restore() -> None:
