@@ -268,6 +268,11 @@ class DesignFile:
         return load if given is None else refused(f"{section.key}.weights", LoadSpectrum, torques, given, **run_at)
 
     @property
+    def part_of(self) -> dict[str, str]:
+        """Notes that the pair is a part of something, by the tables that say so, as [stage]; empty for a pair alone."""
+        return {name: each.whole for name, each in self.tables.items() if isinstance(each, FurtherTable) and each.whole}
+
+    @property
     def materials(self) -> tuple[str | None, str | None]:
         """Names of the materials of pinion and wheel; None where the file names none."""
         return self.drawn["pinion"].get("material"), self.drawn["wheel"].get("material")

@@ -89,6 +89,22 @@ def member_speeds(stage: PlanetaryStage, speed: Given) -> Members:
     return Members(sun, ring, carrier, carrier - (sun - carrier) * sun_teeth / planet_teeth)
 
 
+def relative_speeds(stage: PlanetaryStage, speed: Given) -> Members:
+    """Amounts of the speeds of all members against the carrier [rpm], zero for the carrier.
+
+    Args:
+        stage: the stage.
+        speed: speed of the driving member [rpm].
+    """
+    speeds = member_speeds(stage, speed)
+    return Members(*(jnp.abs(each - speeds.carrier) for each in speeds))
+
+
+def driving_speed(stage: PlanetaryStage, speed: Given) -> Scalar:
+    """Speed of the driving member [rpm] that belongs to one of the sun against the carrier."""
+    return real(speed).astype(stage.gears.module.dtype) / relative_speeds(stage, 1.0).sun
+
+
 def output_member(stage: PlanetaryStage) -> Member:
     """The member that neither is fixed nor drives."""
     members: tuple[Member, ...] = ("sun", "ring", "carrier")
@@ -102,8 +118,7 @@ def gear_ratio(stage: PlanetaryStage) -> Scalar:
 
 def mesh_frequency(stage: PlanetaryStage, speed: Given) -> Scalar:
     """Mesh frequency [Hz] of all meshes, z_s |n_s - n_c| / 60, at a speed of the driving member [rpm]."""
-    speeds = member_speeds(stage, speed)
-    return stage.gears.sun_teeth * jnp.abs(speeds.sun - speeds.carrier) / 60
+    return stage.gears.sun_teeth * relative_speeds(stage, speed).sun / 60
 
 
 @program

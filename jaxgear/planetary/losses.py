@@ -10,7 +10,7 @@ from jaxtyping import Array, Float
 from ..metrics import Lubricant, loss_power
 from ..numerics import Checked, Given, check, program, real, result
 from .cycle import StageCycle
-from .kinematics import member_speeds, member_torques, output_member
+from .kinematics import driving_speed, member_speeds, member_torques, output_member
 from .mesh_cycles import StageMeshes
 from .stage import PlanetaryStage
 
@@ -79,8 +79,7 @@ def _losses(
     # power of the sun relative to the carrier, which the ring's mesh passes on
     rolling = _WATT * jnp.sum(meshes.sun.torque).astype(dtype) * speed
     basic = (1 - jnp.sum(losses[0]) / rolling) * (1 - jnp.sum(losses[1]) / rolling)
-    unit = member_speeds(cycle.stage, 1.0)
-    power = _WATT * cycle.torque * speed / jnp.abs(unit.sun - unit.carrier)
+    power = _WATT * cycle.torque * driving_speed(cycle.stage, speed)
     return StageLosses(
         sun_mesh_loss=losses[0],
         ring_mesh_loss=losses[1],

@@ -12,7 +12,7 @@ from ..contact.status import Statuses
 from ..metrics import root_stress
 from ..numerics import Given, changed, check, maximum, program, real
 from .cycle import StageCycle
-from .kinematics import member_speeds, mesh_force
+from .kinematics import mesh_force, relative_speeds
 from .meshes import Flanks, LoadedMesh, PlacedMesh
 from .solve import PreparedStage
 
@@ -162,8 +162,8 @@ def mesh_cycles(
     speeds: tuple[Given | None, Given | None] = None, None
     if speed is not None:
         check("speed", speed, "rpm", low=0.0)
-        of = member_speeds(cycle.stage, speed)
-        speeds = abs(of.sun - of.carrier), abs(of.planet - of.carrier)
+        relative = relative_speeds(cycle.stage, speed)
+        speeds = relative.sun, relative.planet
     force = mesh_force(cycle.stage, cycle.torque) / cycle.stage.planets
     curves = (cycle.sun_approach, cycle.sun_force), (cycle.ring_approach, cycle.ring_force)
     flanks = cycle.flanks.at_sun, cycle.flanks.at_ring

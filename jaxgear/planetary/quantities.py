@@ -14,23 +14,22 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..contact.status import Status
+from ..dynamics.settings import DAMPING_RATIO
 from ..metrics import AbstractSettings, Analysis, Lubricant, Quantity, Vocabulary, peak_to_peak
 from ..numerics import Quantile, maximum, number, real
 from ..numerics.reductions import AbstractReduction, Max, Range, Value
 from .cycle import StageCycle
 from .flanks import of_design
-from .kinematics import driving_torque, member_speeds
+from .kinematics import driving_speed, driving_torque
 from .losses import StageLosses, stage_losses
 from .mesh_cycles import StageMeshes, mesh_cycles
 from .response import StageResponse, stage_response
 from .solve import PreparedStage, solve_stage
-from .stage import PlanetaryStage
 from .vibration import StageInertias, StageSystem, stage_system
 
 Scalar = Float[Array, ""]
 
 _MINUTE = 60.0  # s
-_DAMPING = 0.05  # of gears with splash lubrication, 0.03 to 0.1
 _LEVEL = 0.95  # of the stages with errors that are no worse than a quantity with errors says
 
 
@@ -62,7 +61,7 @@ class StageSettings(AbstractSettings):
     )
     lubricant: Lubricant | None = None
     inertias: StageInertias | None = None
-    damping_ratio: Scalar = number("", low=0.0, high=1.0, default=_DAMPING)
+    damping_ratio: Scalar = number("", low=0.0, high=1.0, default=DAMPING_RATIO)
 
     def check_together(self) -> None:
         planets = self.prepared.stage.planets
@@ -79,7 +78,7 @@ class StageSettings(AbstractSettings):
     def contacts(self, analysis: Analysis) -> StageMeshes:
         """Contacts of all its meshes with the flanks and at the torque of an analysis."""
         point = analysis.operating_point
-        speed = None if point.speed is None else point.speed / _relative_speed(self.prepared.stage)
+        speed = None if point.speed is None else driving_speed(self.prepared.stage, point.speed)
         options = {"speed": speed, "friction": point.friction}
         return analysis.once(self, "contacts", lambda: mesh_cycles(self.prepared, self.solve(analysis), **options))
 
@@ -144,12 +143,6 @@ def _solved(prepared: PreparedStage, analysis: Analysis) -> StageCycle:
     return solve_stage(prepared, torque, **flanks._asdict())
 
 
-def _relative_speed(stage: PlanetaryStage) -> Scalar:
-    """Speed of the sun against the carrier over that of the driving member."""
-    unit = member_speeds(stage, 1.0)
-    return jnp.abs(unit.sun - unit.carrier)
-
-
 def _values(of: Callable[[StageCycle], Array], analysis: Analysis, settings: StageSettings) -> Float[Array, "..."]:
     cycle = settings.solve(analysis)
     return jnp.where(jnp.all(cycle.converged), of(cycle), jnp.nan)
@@ -172,7 +165,7 @@ def _dynamic_factor(analysis: Analysis, settings: StageSettings) -> Scalar:
 
 def _with_errors(name: str, analysis: Analysis, settings: StageSettings) -> Scalar:
     cycles, own = settings.solve_with_errors(analysis), OF_STAGE[name]
-    values = jax.vmap(lambda cycle: own.reduction(own.of(cycle).ravel()))(cycles)
+    values = jax.vmap(own.number)(cycles)
     alike = jnp.ones_like(values) / len(values)
     fine = jnp.all(cycles.converged)
     return jnp.where(fine, Quantile(real(_LEVEL))(values, alike), jnp.nan)
@@ -194,6 +187,10 @@ class _OfCycle(NamedTuple):
     reduction: AbstractReduction
     unit: str
     meaning: str
+
+    def number(self, cycle: StageCycle) -> Scalar:
+        """The number of a stage."""
+        return self.reduction(self.of(cycle).ravel())
 
 
 OF_STAGE = {

@@ -10,7 +10,6 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from ..metrics import peak_to_peak
 from ..numerics import program, real
 from ..report import Chapter, Figure, Part, Record, Table, numbers_of, table_of
 from .cycle import StageCycle
@@ -26,7 +25,7 @@ from .kinematics import (
 from .losses import StageLosses, stage_losses
 from .mesh_cycles import StageMeshes, mesh_cycles
 from .meshes import StageFlanks
-from .quantities import StageSettings
+from .quantities import OF_LOSSES, OF_STAGE, StageSettings
 from .response import stage_response
 from .solve import PreparedStage, solve_stage
 from .stage import PlanetaryStage
@@ -53,18 +52,18 @@ def _root_stress(flank: str, meshes: StageMeshes) -> float:
 
 
 # of a cycle
-_NUMBERS: tuple[Record[StageCycle], ...] = (
-    Record("stage_ppte", "um", lambda cycle: peak_to_peak(cycle.transmission_error), "PPTE of the stage [µm]"),
-    Record(
-        "mean_stage_transmission_error",
-        "um",
-        lambda cycle: jnp.mean(cycle.transmission_error),
-        "mean transmission error of the stage [µm]",
-    ),
-    Record("load_sharing_factor", "", lambda cycle: cycle.load_sharing_factor, "load sharing factor K_gamma"),
-    Record("peak_load_sharing_factor", "", lambda cycle: cycle.peak_load_sharing_factor, "largest load share"),
-    Record("sun_orbit", "um", lambda cycle: cycle.orbit, "orbit of the sun [µm]"),
-    Record("max_pin_force", "N", lambda cycle: jnp.max(cycle.pin_force), "largest force on a pin [N]", ".0f"),
+_HEADINGS = {
+    "stage_ppte": "PPTE of the stage [µm]",
+    "mean_stage_transmission_error": "mean transmission error of the stage [µm]",
+    "load_sharing_factor": "load sharing factor K_gamma",
+    "peak_load_sharing_factor": "largest load share",
+    "sun_orbit": "orbit of the sun [µm]",
+    "max_pin_force": "largest force on a pin [N]",
+}
+_NUMBERS: tuple[Record[StageCycle], ...] = tuple(
+    Record(name, of.unit, of.number, heading, ".0f" if of.unit == "N" else ".3f")
+    for name, heading in _HEADINGS.items()
+    for of in [OF_STAGE[name]]
 )
 
 # of the contacts of all planets
@@ -77,9 +76,12 @@ _OF_MESHES: tuple[Record[StageMeshes], ...] = tuple(
     for flank, words in _FLANKS.items()
 )
 
-_OF_LOSSES: tuple[Record[StageLosses], ...] = (
-    Record("stage_efficiency", "", lambda losses: losses.efficiency, "efficiency", ".5f"),
-    Record("stage_loss_power", "W", lambda losses: losses.loss_power, "power loss [W]", ".1f"),
+_OF_LOSSES: tuple[Record[StageLosses], ...] = tuple(
+    Record(name, OF_LOSSES[name][1], OF_LOSSES[name][0], heading, form)
+    for name, heading, form in (
+        ("stage_efficiency", "efficiency", ".5f"),
+        ("stage_loss_power", "power loss [W]", ".1f"),
+    )
 )
 
 

@@ -24,7 +24,7 @@ from ..report import Part
 from ..tolerance import TruncatedNormal
 from .flanks import PlanetFlanks, of_design
 from .gears import StageGears
-from .kinematics import driving_torque, mesh_frequency
+from .kinematics import driving_speed, driving_torque, relative_speeds
 from .quantities import DYNAMIC_FACTOR, OF_LOSSES, WITH_ERRORS, StageSettings
 from .report import part, stages_over_torques
 from .solve import prepare_stage
@@ -90,10 +90,8 @@ class StageSection(FurtherTable, section_of(PlanetaryStage, ("gears",), open=Fal
     carrier_inertia: float | None = entry(positive("kg m2"))
     carrier_mass: float | None = entry(positive("kg"))
     damping_ratio: float | None = entry(real(Number("", low=0.0, high=1.0)))
-    _outer: DesignFile
-    _torque: float  # on the driving member, as are range and speed
-    _torques: tuple[float, float]
-    _speed: float | None
+    _outer: DesignFile  # of planet and ring
+    _stage: PlanetaryStage
     _made: tuple[DesignFile, StageSettings] | None = None
 
     @classmethod
@@ -153,16 +151,13 @@ class StageSection(FurtherTable, section_of(PlanetaryStage, ("gears",), open=Fal
             outer = design_of(design.path, {**self._ring_content(content), **given})
         if not outer.pair().wheel.alike:
             raise DesignFileError("ring.support", "has to hold the ring of a stage alike all round")
-        planets, sun_teeth = self.planets, design.pair().pinion.teeth
-        stage = self._stage(design, outer)
-        share = float(1 / (planets * driving_torque(stage, 1.0)))
-        speed = None
-        if design.speed is not None:
-            speed = float(60 * mesh_frequency(stage, design.speed) / sun_teeth)
+        gears = refused(self.key, StageGears.of_pairs, design.pair(), outer.pair())
+        stage: PlanetaryStage = template_of(self, PlanetaryStage).having(gears=gears).build({})
+        share = float(1 / driving_torque(stage, stage.planets))
+        speed = None if design.speed is None else float(relative_speeds(stage, design.speed).sun)
         load: Any = {"torque": as_real(share * design.torque)} | ({} if speed is None else {"speed": as_real(speed)})
         low, high = design.torque_range
-        self._outer, self._speed = outer, design.speed
-        self._torque, self._torques = design.torque, design.torque_range
+        self._outer, self._stage = outer, stage
         return replace(
             design,
             text=json.dumps(content, sort_keys=True, default=str),
@@ -177,11 +172,6 @@ class StageSection(FurtherTable, section_of(PlanetaryStage, ("gears",), open=Fal
             ),
             _load=design._load.having(**load),
         )
-
-    def _stage(self, design: DesignFile, outer: DesignFile) -> PlanetaryStage:
-        gears = refused(self.key, StageGears.of_pairs, design.pair(), outer.pair())
-        stage: PlanetaryStage = template_of(self, PlanetaryStage).having(gears=gears).build({})
-        return stage
 
     def check(self, design: DesignFile) -> None:
         """Refuses flanks that carry nothing, and pairs that differ."""
@@ -218,8 +208,7 @@ class StageSection(FurtherTable, section_of(PlanetaryStage, ("gears",), open=Fal
         """The stage with prepared meshes, and pin errors where the file has a tolerance."""
         if self._made is not None and self._made[0] is design:
             return self._made[1]
-        stage = self._stage(design, self._outer)
-        step = math.lcm(_FEWEST_POSITIONS, stage.planets)
+        step = math.lcm(_FEWEST_POSITIONS, self.planets)
         sizes = {"sun": design.resolution(), "ring": self._outer.resolution()}
         slices = max(each.slices for each in sizes.values()) if self.varies_along_face() else None
         meshes = {}
@@ -228,7 +217,7 @@ class StageSection(FurtherTable, section_of(PlanetaryStage, ("gears",), open=Fal
             meshes[name] = each.mesh(own if slices is None else replace(own, slices=slices))
         lubricant = design.tables.get("lubricant")
         made = StageSettings(
-            prepare_stage(stage, **meshes), self._pin_errors(stage.planets), lubricant, self._inertias(design)
+            prepare_stage(self._stage, **meshes), self._pin_errors(self.planets), lubricant, self._inertias(design)
         )
         if self.damping_ratio is not None:
             made = changed(made, damping_ratio=as_real(self.damping_ratio))
@@ -249,12 +238,13 @@ class StageSection(FurtherTable, section_of(PlanetaryStage, ("gears",), open=Fal
 
     def part(self, design: DesignFile, name: str, cycle: MeshCycle) -> Part:
         """The stage with the flanks of a design, for the terminal, the report and the files."""
-        settings, (low, high) = self.settings(design), self._torques
-        torques = np.concatenate([[self._torque], np.linspace(low, high, _TORQUES)])
-        flanks = of_design(cycle.pinion, cycle.wheel)
-        unmodified, modified = stages_over_torques(settings.prepared, as_real(torques), flanks)
+        settings, flanks = self.settings(design), of_design(cycle.pinion, cycle.wheel)
+        torques = np.concatenate([[design.torque], np.linspace(*design.torque_range, _TORQUES)])
+        driving = driving_torque(self._stage, self.planets * torques)
+        unmodified, modified = stages_over_torques(settings.prepared, driving, flanks)
         cycles = {"unmodified": unmodified, name: modified}
-        return part(settings, cycles, self._speed, design.friction)
+        speed = None if design.speed is None else float(driving_speed(self._stage, design.speed))
+        return part(settings, cycles, speed, design.friction)
 
 
 def _names(content: object) -> set[str]:

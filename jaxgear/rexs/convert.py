@@ -114,9 +114,8 @@ def _stages(stages: Iterable[RexsStage]) -> Table:
 def _to_rexs(source: Path, target: Path) -> None:
     design = load_design(source)
     design.check_drive("jaxgear convert")
-    for name, of_file in design.tables.items():
-        if getattr(of_file, "called", {}):  # what the file calls pinion and wheel: they are a part of it
-            raise DesignFileError(name, "REXS is written of single pairs: give one of its meshes as a file", source)
+    for name in design.part_of:
+        raise DesignFileError(name, "REXS is written of single pairs: give one of its meshes as a file", source)
     free = [name for name in design.bounds if design.open_case or name not in design.values]
     if free:
         problem = f"convert needs numbers, these are free: {', '.join(free)}; give each a value"

@@ -69,7 +69,7 @@ class ComparisonRun:
         self._mesh: Mesh = jax.block_until_ready(self.design.mesh(coarse(size) if self._quick else size))
         self._searched_at = self._mesh.resolution.positions
         self._torques = torques_of(self.design, quick=self._quick)
-        whole = next((name for name, of in self.design.tables.items() if getattr(of, "whole", "")), "")
+        whole = next(iter(self.design.part_of), "")
         if whole:  # its quantities would be verified by nothing
             self._unverified = f"finite-element structures are of pairs, [{whole}] is more than one"
             if verify:

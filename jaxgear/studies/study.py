@@ -211,8 +211,8 @@ class AbstractStudy(abc.ABC, Generic[R]):
 
     def omits(self) -> str:
         """Message naming the tables of the file, shafts excepted, that the study ignores, and why; "" for none."""
-        wholes = [getattr(table, "whole", "") for table in self.design.tables.values()]
-        return "; ".join(line for line in (manufactured.left_out(self.design), *wholes) if line)
+        lines = manufactured.left_out(self.design), *self.design.part_of.values()
+        return "; ".join(line for line in lines if line)
 
     @property
     def left_out(self) -> str:
