@@ -34,6 +34,7 @@ addendum = 0.8
 
 [stage]
 planets = 4
+tangential_pin_error = [0.0, 0.0, 0.0, 0.0]
 radial_pin_stiffness = 500.0
 tangential_pin_stiffness = 500.0
 pin_tolerance = 20.0
@@ -143,7 +144,11 @@ BARE = STAGE.partition("[variables]")[0]
             'support = { type = "support_arcs", arcs = 6, width = 6.0 }',
             "ring.support: has to hold the ring of a stage alike all round",
         ),
-        ("planets = 4", "planets = 5", "stage: 84 teeth of sun and ring are no multiple of 5 planets"),
+        (
+            "planets = 4\ntangential_pin_error = [0.0, 0.0, 0.0, 0.0]",
+            "planets = 5",
+            "stage: 84 teeth of sun and ring are no multiple of 5 planets",
+        ),
         ("planets = 4", 'planets = 4\nfixed = "sun"', 'stage: driving = "sun" must not be the fixed member'),
         ("pin_tolerance = 20.0", "", "stage.pin_samples: 3 has no effect without stage.pin_tolerance"),
         ("torque = 400.0", "torque = -400.0", "load.torque: -400 N m is carried by the coast flanks"),
