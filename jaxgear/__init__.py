@@ -2,7 +2,7 @@
 
 The pipeline in reading order, every step differentiable and vmappable:
 
-    Gear, RingGear, GearPair    geometry of an involute pair, external (spur or helical) or internal (spur)
+    Gear, RingGear, GearPair    geometry of an involute pair, external (spur or helical) or internal
     TipRelief + LeadCrowning    microgeometry, composed with `+`
     default_compliance          teeth, gear bodies with coupled neighbours, Hertzian contact
     finite_element_compliance   teeth and bodies by finite elements, for gears that stay as they are

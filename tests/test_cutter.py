@@ -220,7 +220,6 @@ def test_cutter_room_tells_traced_gears():
         ({"cutter_teeth": 20.5}, "Gear: cutter_teeth = 20.5 must be a whole number"),
         ({"cutter_teeth": 4}, "Gear: cutter_teeth = 4 must be at least 5"),
         ({"protuberance": 0.02}, "Gear: protuberance: must be left out beside cutter_teeth"),
-        ({"helix_angle": 10.0}, "Gear: helix_angle = 10 deg, must be 0 deg beside cutter_teeth"),
         ({"cutter_profile_shift": 1.5}, "profile_shift = 1.5 x module .* makes the teeth of the cutter pointed"),
         ({"cutter_profile_shift": -1.5, "dedendum": 0.5}, "puts the tip of the cutter inside its base circle"),
         ({"root_radius": 0.5}, "Gear: root_radius = 0.5 x module must be at least 0 x module and at most 0.39"),

@@ -115,7 +115,7 @@ def test_new_numbers_do_not_retrace():
     @eqx.filter_jit
     def ppte(pair, torque, relief):
         traces.append(1)
-        mesh = jg.prepare(pair, resolution=jg.Resolution(positions=8))
+        mesh = jg.prepare(pair, resolution=jg.Resolution(positions=8, pairs=4))
         return jg.peak_to_peak(jg.solve(mesh, torque, pinion=relief).transmission_error)
 
     for z, m, torque, amount in ((19, 3.0, 50.0, 0.0), (21, 2, 70, 5), (30, 4.0, 100.0, 8.0)):

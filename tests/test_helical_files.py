@@ -72,7 +72,7 @@ REFUSED = {
     ),
     "two variables": (
         {"pinion": OPEN, "wheel": OPEN, "tail": VARIABLE.format(low=0.0, high=20.0)},
-        "wheel.helix_angle: has no effect, pinion.helix_angle is a variable and that of the wheel is its opposite",
+        "wheel.helix_angle: has no effect, pinion.helix_angle is a variable and that of the wheel follows from it",
     ),
     "range": ({"wheel": "helix_angle = 50.0"}, "wheel.helix_angle: 50 deg must be at least -45 deg and at most 45 deg"),
     "bounds": (

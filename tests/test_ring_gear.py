@@ -257,7 +257,6 @@ PLANET, RING = jg.Gear(19, 3.0, face_width=20.0), jg.RingGear(64, 3.0, face_widt
         (lambda: jg.RingGear(64, 3.0, face_width=20.0, root_radius=0.9), "RingGear: root_radius = 0.9"),
         (lambda: jg.GearPair(RING, PLANET), "pinion is a RingGear"),
         (lambda: jg.GearPair(PLANET, RING, 68.0), "must be at most 67.5"),
-        (lambda: jg.RingGear(64, 3.0, face_width=20.0, helix_angle=10.0), "helix_angle"),
     ],
 )
 def test_what_cannot_run_is_refused(wrong, said):

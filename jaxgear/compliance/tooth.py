@@ -48,8 +48,9 @@ def tooth_load(outline: Outline, roll_length: Real) -> ToothLoad:
     normal = None
     if outline.normal is not None:
         gear = outline.normal.gear
-        above = jnp.sqrt(drawn.base_radius**2 + roll_length**2) - drawn.pitch_radius
-        normal = tooth_load(outline.normal, safe_sqrt((gear.pitch_radius + above) ** 2 - gear.base_radius**2))
+        above = gear.signed(jnp.sqrt(drawn.base_radius**2 + roll_length**2)) - outline.gear.pitch_radius
+        virtual = safe_sqrt((gear.pitch_radius + above) ** 2 - gear.base_radius**2)
+        normal = tooth_load(outline.normal, gear.signed(virtual))
     return ToothLoad(outline, roll_length, angle, drawn.base_radius / jnp.cos(angle), x / jnp.cos(angle), normal)
 
 

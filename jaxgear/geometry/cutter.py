@@ -108,7 +108,7 @@ def rolling(
     height: Number | None = None,
     root_circle_radius: Number | None = None,
 ) -> Cutter:
-    """Cutter in mesh with a spur gear.
+    """Cutter in mesh with a gear, in the transverse section.
 
     Args:
         teeth, cutter_teeth: numbers of teeth z and z_0.

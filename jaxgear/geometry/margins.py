@@ -213,7 +213,7 @@ def _apart(first: Gear, second: Gear) -> Scalar:
     pitches = jnp.abs(first.base_pitch - second.base_pitch) / first.base_pitch
     if first.helix_angle is None and second.helix_angle is None:
         return pitches
-    return pitches + jnp.abs(first.base_helix_angle + second.base_helix_angle)
+    return pitches + jnp.abs(first.base_helix_angle + second.signed(second.base_helix_angle))
 
 
 def play_between(pinion: Gear, wheel: Gear, tangent: Scalar | None) -> Scalar:
@@ -258,11 +258,13 @@ def faults_between(
         if float(getattr(wheel, name)) != float(getattr(pinion, name))
     ]
     hands = [0.0 if gear.helix_angle is None else float(gear.helix_angle) for gear in (pinion, wheel)]
-    if hands[0] != -hands[1]:
-        faults.append(
-            f"GearPair: wheel helix_angle = {hands[1]:g} deg must be {0.0 - hands[0]:g} deg: gears on parallel shafts "
-            "have the same angle and opposite hands"
+    wanted = wheel.signed(0.0 - hands[0])
+    if hands[1] != wanted:
+        gears, hand = (
+            ("planet and ring gear", "hand") if wheel.is_internal else ("gears on parallel shafts", "opposite hands")
         )
+        which = f"{gears} have the same angle and {hand}"
+        faults.append(f"GearPair: wheel helix_angle = {hands[1]:g} deg must be {wanted:g} deg: {which}")
     missed = {name for name, holds in held.items() if not holds}
     if "base_circle_clearance" in missed:
         closest = float(wheel.signed(pinion.base_radius + wheel.base_radius))

@@ -2,6 +2,7 @@
 
 The outline of a helical gear is that of the transverse section. The basic rack belongs to the normal section: in the
 transverse section it is stretched by 1 / cos(beta) along its pitch line, and the circle at its tip becomes an ellipse.
+The tip of a cutter is rounded by a circle in the transverse section.
 
 Tooth frame: origin in the gear centre, y along the tooth centreline, x to the side. The trochoid is the envelope of the
 rack's tip, in the parameter g, the inclination of the common normal, which runs through the pitch point: g = pi/2 on
@@ -152,8 +153,9 @@ def outline(gear: Gear) -> Outline:
     alpha, drawn = _generating_angle(gear), curves(gear)
     end_x, end_y = drawn.trochoid(jnp.full_like(alpha, jnp.pi / 2))
     tangential = _tangential_form_roll_length(gear)
+    normal = None if gear.helix_angle is None else outline(virtual_gear(gear))
     if gear.is_internal:  # no cutter undercuts a ring gear: its involute ends at the base circle, inside the tip
-        return Outline(gear, drawn, alpha, tangential, jnp.arctan(end_x / end_y), jnp.zeros_like(alpha))
+        return Outline(gear, drawn, alpha, tangential, jnp.arctan(end_x / end_y), jnp.zeros_like(alpha), normal)
     # at the limit of undercut both junctions lie on the base circle; rounding must not choose between them
     undercut = tangential < -8 * jnp.finfo(tangential.dtype).eps * gear.pitch_radius
     at_base = bracketed_root(_height_above_base, alpha, jnp.full_like(alpha, jnp.pi / 2), drawn)
@@ -167,7 +169,6 @@ def outline(gear: Gear) -> Outline:
     if gear.protuberance is None:
         cut = jnp.where(undercut, cut, alpha)
         form = jnp.where(undercut, form, jnp.maximum(tangential, 0.0))
-    normal = None if gear.helix_angle is None else outline(virtual_gear(gear))
     return Outline(gear, drawn, cut, form, jnp.arctan2(end_x, end_y), undercut.astype(form.dtype), normal)
 
 

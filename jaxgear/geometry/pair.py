@@ -36,10 +36,10 @@ class GearPair(Checked):
             positive face coordinates [mm].
 
     Raises:
-        ValueError: for gears of different module or pressure angle, helical gears of the same hand, an impossible
-            centre distance, a total contact ratio below 1, a tip that hits the fillet or the root circle of the mate,
-            or faces that do not overlap; the message is the first of `explain`. Traced pairs are not checked; see their
-            `margins`.
+        ValueError: for gears of different module or pressure angle, helical gears of the same hand (a planet and a ring
+            gear of opposite hands), an impossible centre distance, a total contact ratio below 1, a tip that hits the
+            fillet or the root circle of the mate, or faces that do not overlap; the message is the first of `explain`.
+            Traced pairs are not checked; see their `margins`.
     """
 
     pinion: Gear

@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ..numerics import changed, concrete, number, real
-from .gear import Gear, Shape
+from .gear import Gear, Shape, _transverse_module
 from .rim_support import AbstractRimSupport
 
 Scalar = Float[Array, ""]
@@ -22,16 +22,16 @@ _FEWEST_CUTTER_TEETH = 10
 
 
 class RingGear(Gear):
-    """Internal spur gear; the wheel of a `GearPair` whose pinion is a planet.
+    """Internal gear, spur or helical; the wheel of a `GearPair` whose pinion is a planet.
 
     All numbers given are positive. The profile shift has the sign of ISO 21771: positive thickens the tooth and moves
     its tip inwards. Radii and roll lengths that are properties have the sign of that standard, negative, with which
     the formulas of external gears hold for a ring gear.
 
-        d_a = m (z - 2 h_aP - 2 x),  d_f = m (z + 2 h_fP - 2 x)
+        d_a = m_n (z / cos(beta) - 2 h_aP - 2 x),  d_f = m_n (z / cos(beta) + 2 h_fP - 2 x)
 
     Attributes:
-        teeth, module, pressure_angle, profile_shift, face_width, tip_edge_radius, material: as of `Gear`.
+        teeth, module, pressure_angle, profile_shift, face_width, helix_angle, tip_edge_radius, material: as of `Gear`.
         tooth_thickness_allowance, tooth_thickness_tolerance: as of `Gear`.
         addendum, dedendum: coefficients h_aP and h_fP [modules]. Rings need short teeth: with h_aP = 1 the tip of many
             meets the pinion below its form circle. The addendum of the cutter follows from the root circle.
@@ -49,13 +49,14 @@ class RingGear(Gear):
 
     Raises:
         ValueError: as of `Gear`, for a tip diameter that does not lie between base and root diameter, or a rim
-            diameter not greater than the root diameter. Helical ring gears are not covered.
+            diameter not greater than the root diameter.
 
     References:
         ISO 21771:2007; SDP/SI D785, Elements of Metric Gear Technology (internal gears).
     """
 
     is_internal: ClassVar[bool] = True
+    body_diameter: ClassVar[str] = "rim_diameter"
 
     addendum: Scalar = number("x module", low=0.3, high=2.0, default=0.8, kw_only=True)
     rim_diameter: Scalar | None = number("mm", low=0.0, open_low=True, optional=True, default=None, kw_only=True)
@@ -83,7 +84,8 @@ class RingGear(Gear):
         """Addendum of the cutter that reaches the root circle, in modules."""
         cutter = self._cutter_of(0.0)  # its tip does not depend on its rounding
         assert cutter is not None and self.cutter_teeth is not None
-        return cutter.tip_radius / self.module - 0.5 * self.cutter_teeth - self.cutter_profile_shift
+        pitch_radius = 0.5 * _transverse_module(self) * self.cutter_teeth
+        return (cutter.tip_radius - pitch_radius) / self.module - self.cutter_profile_shift
 
     @property
     def bore_radius(self) -> Real:
@@ -96,7 +98,8 @@ class RingGear(Gear):
 
     @property
     def mirrored(self) -> Self:
-        return self if self.support is None else changed(self, support=self.support.mirrored)
+        turned = super().mirrored
+        return turned if self.support is None else changed(turned, support=self.support.mirrored)
 
     @property
     def tip_height(self) -> Real:
@@ -104,7 +107,7 @@ class RingGear(Gear):
         return jnp.minimum(self.tip_radius - self.root_circle_radius, self.base_radius - self.tip_radius)
 
     def open_diameters(self) -> dict[str, Any]:
-        given = self.teeth - 2 * self.profile_shift
+        given = _transverse_module(self) / self.module * self.teeth - 2 * self.profile_shift
         found = {}
         if self.tip_diameter is None:
             found["tip_diameter"] = self.module * (given - 2 * self.addendum)

@@ -66,8 +66,9 @@ class GearSection(_FlankKeys, _ProfileKeys, _ThicknessKeys, _GearKeys):  # type:
 
     Attributes:
         helix_angle: beta on the reference cylinder, positive for a right hand; a spur gear without it. Module, pressure
-            angle and coefficients are then those of the normal section. Pinion and wheel have opposite hands: that of
-            one of them is enough, and a variable stands in one of them; where both are given they must be opposite.
+            angle and coefficients are then those of the normal section. Pinion and wheel have opposite hands, a planet
+            and its ring gear the same: that of one of them is enough, and a variable stands in one of them; where both
+            are given they must agree.
         tooth_thickness_allowance: E_sns on the reference cylinder, negative for backlash, or [E_sni, E_sns].
         span: base tangent length W_k over `teeth_spanned` teeth, or its limits.
         teeth_spanned: k.
@@ -234,18 +235,19 @@ def _check_alike(pinion: Template, wheel: Template) -> None:
 
 
 def _of_opposite_hands(gears: dict[str, Template]) -> dict[str, Template]:
-    """Both gears with opposite helix angles, of which the file may give one; spur gears without any."""
+    """Both gears with opposite helix angles, ring gears with the same; the file may give one, spur gears none."""
     angles = {name: gear.fields[_HAND] for name, gear in gears.items() if _HAND in gear.fields}
     free = [name for name, angle in angles.items() if isinstance(angle, Free)]
     if len(angles) == len(gears) and free:
         other = "wheel" if free[0] == "pinion" else "pinion"
-        problem = f"has no effect, {free[0]}.{_HAND} is a variable and that of the {other} is its opposite"
+        problem = f"has no effect, {free[0]}.{_HAND} is a variable and that of the {other} follows from it"
         raise DesignFileError(f"{gears[other].key}.{_HAND}", problem)
     if len(angles) != 1:
         return gears
     (own, angle), *_ = angles.items()
-    opposite = replace(angle, opposite=True) if isinstance(angle, Free) else -angle
-    return {name: gear if name == own else gear.having(**{_HAND: opposite}) for name, gear in gears.items()}
+    if gears["wheel"].make is not RingGear:
+        angle = replace(angle, opposite=True) if isinstance(angle, Free) else -angle
+    return {name: gear if name == own else gear.having(**{_HAND: angle}) for name, gear in gears.items()}
 
 
 def longest_path(pair: GearPair, part: Template, bounds: Mapping[str, tuple[float, float]]) -> GearPair:

@@ -24,8 +24,8 @@ _MOST, _LEAST_MOST = 3.0, 20.0  # largest amount that is searched, relative to t
 _PRESSURE_ANGLE, _ADDENDUM, _DEDENDUM = 20.0, 1.0, 1.25
 
 _STARTER = Path(__file__).with_name("starter.txt")  # with fields to be filled
-_HAND = "helix_angle = {angle!r}   # deg, positive for a right hand; the wheel has the other\n"
-_SPUR = "# helix_angle = 15.0            # deg, positive for a right hand; the wheel has the other\n"
+_HAND = "helix_angle = {angle!r}   # deg, positive for a right hand; the {mate} has the {other}\n"
+_SPUR = "# helix_angle = 15.0            # deg, positive for a right hand; the {mate} has the {other}\n"
 _RACK = "pressure_angle = {angle!r}         # deg\n"
 _FILLET = "root_radius = {radius:.4f}          # x module, c_P / (1 - sin(alpha)) of ISO 53\n"
 _SHIFT = "profile_shift = {shift!r}          # x module\n"
@@ -83,6 +83,7 @@ def write_starter(
     if ring:
         rim, cutter = -2 * float(pair.wheel.bore_radius), float(np.asarray(pair.wheel.cutter_teeth))
         mate_shift += _RIM.format(rim=rim) + _CUTTER.format(teeth=cutter)
+    others = {"mate": "ring", "other": "same"} if ring else {"mate": "wheel", "other": "other"}
     write_filled(
         path,
         _STARTER,
@@ -93,12 +94,12 @@ def write_starter(
         face_width=face_width,
         distance=float(pair.working_center_distance),
         torque=torque,
-        mate="ring" if ring else "wheel",
+        mate=others["mate"],
         rack=rack + fillet,
         mate_rack=rack if ring else rack + fillet,
         shift=shifts[0],
         mate_shift=mate_shift,
-        hand="" if ring else _HAND.format(angle=helix_angle) if helix_angle else _SPUR,
+        hand=_HAND.format(angle=helix_angle, **others) if helix_angle else _SPUR.format(**others),
         speed=speed_line(speed),
         amount=amount,
         most=max(_MOST * amount, _LEAST_MOST),
@@ -178,7 +179,9 @@ def starter_pair(
             helix_angle=real(hand),
             root_radius=None if make is RingGear else fillet,
         )
-        for make, count, shift, hand in zip(kinds, teeth, profile_shift, (helix_angle, -helix_angle))
+        for make, count, shift, hand in zip(
+            kinds, teeth, profile_shift, (helix_angle, helix_angle if ring else -helix_angle)
+        )
     )
     return GearPair(pinion, wheel)
 

@@ -69,7 +69,7 @@ def tilting_moments(cycle: MeshCycle) -> tuple[Scalar, Scalar]:
     """Tilting moments F_ax r_w of the axial force on pinion and wheel, with their working pitch radii [N m]."""
     pair, force = cycle.kinematics.pair, 1e-3 * axial_force(cycle)
     secant = 1 / jnp.cos(pair.working_pressure_angle)
-    return force * pair.pinion.base_radius * secant, force * pair.wheel.base_radius * secant
+    return force * pair.pinion.base_radius * secant, force * pair.wheel.signed(pair.wheel.base_radius) * secant
 
 
 @over_batch

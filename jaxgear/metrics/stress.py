@@ -230,8 +230,8 @@ def root_factors(gear: Gear, roll_length: Real) -> RootFactors:
     """
     if gear.helix_angle is not None:
         virtual = virtual_gear(gear)
-        radius = jnp.hypot(gear.base_radius, roll_length) - gear.pitch_radius + virtual.pitch_radius
-        gear, roll_length = virtual, safe_sqrt(radius**2 - virtual.base_radius**2)
+        radius = gear.signed(jnp.hypot(gear.base_radius, roll_length)) - gear.pitch_radius + virtual.pitch_radius
+        gear, roll_length = virtual, gear.signed(safe_sqrt(radius**2 - virtual.base_radius**2))
     section, m = critical_section(gear), gear.module
     angle = load_angle(gear, roll_length)
     cosine = jnp.cos(angle)

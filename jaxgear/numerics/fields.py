@@ -196,7 +196,7 @@ class Checked(eqx.Module):
         return f"{type(self).__name__}({', '.join(parts)})"
 
 
-def changed(module: _Module, **fields: object) -> _Module:
+def changed(module: _Module, /, **fields: object) -> _Module:
     """Copy of a Module with other fields, without conversion and checks."""
     made = object.__new__(type(module))
     for field in dataclasses.fields(module):

@@ -18,22 +18,23 @@ _ROUNDED = 1e-3
 
 
 class StageGears(Checked):
-    """Spur gears of a planetary stage, as far as its kinematics need them.
+    """Gears of a planetary stage, spur or helical, as far as its kinematics need them.
 
     All numbers are positive but profile shifts. That of the ring has the sign of ISO 21771: positive thickens the tooth
     and moves its tip inwards.
 
     Attributes:
         sun_teeth, planet_teeth, ring_teeth: numbers of teeth.
-        module: module [mm].
-        pressure_angle: pressure angle of the basic rack [deg].
+        module: normal module [mm].
+        pressure_angle: normal pressure angle of the basic rack [deg].
         sun_profile_shift, planet_profile_shift, ring_profile_shift: profile shift coefficients.
         center_distance: operating centre distance of both meshes [mm]; None for the backlash-free one of sun and
             planet, which has to be that of planet and ring too.
         planet_tip_diameter: tip diameter of the planet [mm], for the clearance of neighbouring planets; None for
-            m (z + 2 x + 2).
-        planet_thickness_allowance: tooth thickness allowance of the planet on the reference circle [um], negative for a
-            thinner tooth.
+            m (z / cos(beta) + 2 x + 2).
+        planet_thickness_allowance: tooth thickness allowance of the planet on the reference circle, normal to the tooth
+            [um], negative for a thinner tooth.
+        helix_angle: helix angle of the sun [deg], positive for a right hand; planets and ring have the other hand.
 
     Raises:
         ValueError: for centre distances of the two meshes that differ, or a centre distance at which one has no
@@ -51,6 +52,7 @@ class StageGears(Checked):
     center_distance: Scalar | None = number("mm", low=0.0, open_low=True, optional=True, default=None)
     planet_tip_diameter: Scalar | None = number("mm", low=0.0, open_low=True, optional=True, default=None)
     planet_thickness_allowance: Scalar = number("um", default=0.0)
+    helix_angle: Scalar = number("deg", low=-45.0, high=45.0, default=0.0)
 
     def check_together(self) -> None:
         planet, outer = concrete(self.planet_teeth), concrete(self.ring_teeth)
@@ -80,13 +82,12 @@ class StageGears(Checked):
         """The gears of two pairs, that of sun and planet and that of planet and ring.
 
         Raises:
-            ValueError: for helical gears, or planets or centre distances of the pairs that differ.
+            ValueError: for planets or centre distances of the pairs that differ.
         """
         sun, planet, ring = sun_planet.pinion, sun_planet.wheel, planet_ring.wheel
-        if not (sun_planet.is_spur and planet_ring.is_spur):
-            raise ValueError("StageGears: the pairs are of helical gears, must be of spur gears")
-        for name in ("teeth", "module", "pressure_angle", "profile_shift"):
-            one, two = concrete(getattr(planet, name)), concrete(getattr(planet_ring.pinion, name))
+        for name in ("teeth", "module", "pressure_angle", "profile_shift", "helix_angle"):
+            given = (getattr(each, name) for each in (planet, planet_ring.pinion))
+            one, two = (concrete(jnp.zeros_like(planet.module) if each is None else each) for each in given)
             if one is not None and two is not None and not one == two:
                 raise ValueError(
                     f"StageGears: planet has {name} = {float(one):g} in the mesh with the sun and {float(two):g} in "
@@ -111,6 +112,7 @@ class StageGears(Checked):
             center_distance=distance,
             planet_tip_diameter=2 * planet.tip_radius,
             planet_thickness_allowance=planet.tooth_thickness_allowance,
+            helix_angle=jnp.zeros_like(sun.module) if sun.helix_angle is None else sun.helix_angle,
         )
 
     @property
@@ -123,12 +125,25 @@ class StageGears(Checked):
 
     def _free_distance(self, teeth: Scalar, shift: Scalar) -> Scalar:
         """Backlash-free centre distance [mm] of a sum of teeth and one of profile shifts, as of `GearPair`."""
-        target = free_involute(shift + self.planet_profile_shift, teeth, self._rack_angle, self._rack_angle)
+        target = free_involute(shift + self.planet_profile_shift, teeth, self._rack_angle, self._transverse_angle)
         return center_distance_at(self.base_radius(teeth), target)
 
     @property
     def _rack_angle(self) -> Scalar:
         return jnp.deg2rad(self.pressure_angle)
+
+    @property
+    def _helix_cosine(self) -> Scalar:
+        return jnp.cos(jnp.deg2rad(self.helix_angle))
+
+    @property
+    def _transverse_angle(self) -> Scalar:
+        return jnp.arctan(jnp.tan(self._rack_angle) / self._helix_cosine)
+
+    @property
+    def base_helix_angle(self) -> Scalar:
+        """Base helix angle beta_b of the sun [rad]."""
+        return jnp.arcsin(jnp.sin(jnp.deg2rad(self.helix_angle)) * jnp.cos(self._rack_angle))
 
     @property
     def working_center_distance(self) -> Scalar:
@@ -145,25 +160,26 @@ class StageGears(Checked):
 
     def base_radius(self, teeth: Given) -> Scalar:
         """Base radius of a gear with this number of teeth [mm]."""
-        return 0.5 * self.module * teeth * jnp.cos(self._rack_angle)
+        return 0.5 * self.module / self._helix_cosine * teeth * jnp.cos(self._transverse_angle)
 
     @property
     def tip_diameter_of_planet(self) -> Scalar:
         """Tip diameter of the planet, given or of full depth [mm]."""
         if self.planet_tip_diameter is not None:
             return self.planet_tip_diameter
-        return self.module * (self.planet_teeth + 2 * self.planet_profile_shift + 2)
+        return self.module * (self.planet_teeth / self._helix_cosine + 2 * self.planet_profile_shift + 2)
 
     @property
     def phase_between_meshes(self) -> Scalar:
         """Mesh position of planet and ring where sun and planet touch at the pitch point [base pitches], in [0, 1).
 
         gamma = z_p (2 psi_b - inv(alpha_w,s) - inv(alpha_w,r)) / (2 pi) - z_p / 2 with the half tooth angle psi_b of
-        the planet on the base circle. Both flanks are those that carry when the sun drives, or is driven the other way.
+        the planet on the base circle, at the same place of the face: along it both phases rise alike. Both flanks are
+        those that carry when the sun drives, or is driven the other way.
         """
         tangent = jnp.tan(self._rack_angle)
         allowance = 1e-3 * self.planet_thickness_allowance / self.module
         half = (jnp.pi / 2 + 2 * self.planet_profile_shift * tangent + allowance) / self.planet_teeth
         working = sum(involute(jnp.tan(angle)) for angle in self.working_pressure_angles)
-        angle = 2 * (half + involute(tangent)) - working
+        angle = 2 * (half + involute(jnp.tan(self._transverse_angle))) - working
         return (self.planet_teeth * (angle / (2 * jnp.pi) - 0.5)) % 1.0

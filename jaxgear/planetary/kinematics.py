@@ -63,6 +63,35 @@ def mesh_force(stage: PlanetaryStage, torque: Given) -> Scalar:
     return 1e3 * member_torques(stage, torque).sun / stage.gears.base_radius(stage.gears.sun_teeth)
 
 
+class AxialLoads(NamedTuple):
+    """Loads of a helical stage along its axis; of every planet they are in equilibrium but for the moment.
+
+    Attributes:
+        sun: axial force on the sun [N], in the direction of positive face coordinates; minus that on the ring.
+        planet_moment: moment that tilts a planet about the tangent of its circle [N m], which its bearing takes.
+    """
+
+    sun: Scalar
+    planet_moment: Scalar
+
+
+def axial_loads(stage: PlanetaryStage, torque: Given) -> AxialLoads:
+    """Axial force on the sun, and tilting moment of every planet.
+
+    F_a = F tan(beta_b) of the force F of all meshes with the sun. A planet has the opposite forces of its two meshes,
+    F_a / N, on both pitch circles: M = |F_a| / N a (z_p / (z_s + z_p) + z_p / (z_r - z_p)), zero for spur gears.
+
+    Args:
+        stage: the stage.
+        torque: size of the torque on the driving member [N m].
+    """
+    gears = stage.gears
+    axial = mesh_force(stage, torque) * jnp.tan(gears.base_helix_angle)
+    planet = gears.planet_teeth
+    arm = gears.working_center_distance * (planet / (gears.sun_teeth + planet) + planet / (gears.ring_teeth - planet))
+    return AxialLoads(axial, 1e-3 * jnp.abs(axial) / stage.planets * arm)
+
+
 def driving_torque(stage: PlanetaryStage, torque: Given) -> Scalar:
     """Size of the torque on the driving member [N m] that belongs to one on the sun."""
     ratio = stage.gears.ring_teeth / stage.gears.sun_teeth

@@ -1,8 +1,11 @@
 """Meshes of a planetary stage: force and tangent stiffness over approach and mesh position.
 
-A stage needs one mesh of sun and planet and one of planet and ring: those of all planets differ by their phases. The
-wind-up of the gear bodies is left out of the contact. The bore of a planet passes no torque, so that there is none;
-sun and ring wind up under all planets together.
+A stage needs one mesh of sun and planet and one of planet and ring: those of all planets differ by their phases. Face
+coordinates are those of the pair of sun and planet. Seen from the same end of the face the planet turns the other way
+than the sun, so that the mesh of a helical planet and ring is its mirror image, in which a planet of the sun's hand
+drives: contact runs over the face of both meshes in the same direction. The wind-up of the gear bodies is left out of
+the contact. The bore of a planet passes no torque, so that there is none; sun and ring wind up under all planets
+together.
 """
 
 from abc import abstractmethod
@@ -21,8 +24,9 @@ from ..contact.slide import RemovedMaterial, for_contact
 from ..contact.solve import check_alike, flanks_of, material_of
 from ..contact.status import Status, Statuses, status_of
 from ..geometry import explicit, pair_geometry
+from ..geometry.gear import transverse_gear
 from ..microgeometry import AbstractModification
-from ..numerics import Checked, Given, concrete, number
+from ..numerics import Checked, Given, changed, concrete, number
 from ..numerics.spline import interpolate
 
 Scalar = Float[Array, ""]
@@ -240,11 +244,12 @@ class PreparedMesh(AbstractStageMesh):
     def placed(self, phases: Planets, central: Literal[0, 1]) -> AbstractPlacedMesh:
         """The mesh of every planet, prepared at positions that fall on those of the stage."""
         mesh, sizes = self.mesh, self.mesh.resolution
+        pair = mesh.pair.coast if central == 1 else mesh.pair
         steps, left = _steps(phases, sizes.first_phase, sizes.positions)
 
         def of_planet(left: Given) -> Mesh:
             first = sizes.first_phase + left / sizes.positions
-            return prepare_from(first, mesh.pair, mesh.compliance, sizes, mesh.support, mesh.even)
+            return prepare_from(first, pair, mesh.compliance, sizes, mesh.support, mesh.even)
 
         known = concrete(left)
         if known is None or any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves(mesh)):
@@ -256,8 +261,11 @@ class PreparedMesh(AbstractStageMesh):
 
 
 def _windup(mesh: Mesh, gear: Literal[0, 1]) -> Scalar:
-    """Wind-up of the body of one gear [um/N]."""
-    outlines = pair_geometry(explicit(mesh.pair)).outlines
+    """Wind-up of the body of one gear [um/N], without the deflection of helical gears along the axis."""
+    pair = explicit(mesh.pair)
+    if pair.pinion.helix_angle is not None:
+        pair = changed(pair, pinion=transverse_gear(pair.pinion), wheel=transverse_gear(pair.wheel))
+    outlines = pair_geometry(pair).outlines
     rolls = [side.contact_roll_length for side in mesh.sides]
     pinion, wheel = (tooth_load(outline, roll.reshape(len(roll), -1)) for outline, roll in zip(outlines, rolls))
     return mesh.compliance.hub(pinion, wheel)[gear] / mesh.pair.gears[gear].face_width

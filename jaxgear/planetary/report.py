@@ -10,10 +10,11 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from ..numerics import program, real
+from ..numerics import Given, concrete, program, real
 from ..report import Chapter, Figure, Part, Record, Table, numbers_of, table_of
 from .cycle import StageCycle
 from .kinematics import (
+    axial_loads,
     gear_ratio,
     member_speeds,
     member_torques,
@@ -197,10 +198,10 @@ def _lines(cycles: Mapping[str, StageCycle]) -> Iterator[tuple[str, ...]]:
 def _chapters(name: str, cycles: Mapping[str, StageCycle], speed: float | None) -> Iterator[Chapter]:
     cycle = cycles[name]
     tables = [_members(cycle.stage, cycle.torque, speed), _planets(cycle), _orders(cycles)]
-    yield Chapter("Planetary stage", tuple(_texts(cycle.stage, speed)), tables=tables, new_page=True)
+    yield Chapter("Planetary stage", tuple(_texts(cycle.stage, cycle.torque, speed)), tables=tables, new_page=True)
 
 
-def _texts(stage: PlanetaryStage, speed: float | None) -> Iterator[str]:
+def _texts(stage: PlanetaryStage, torque: Given, speed: float | None) -> Iterator[str]:
     output = output_member(stage)
     yield (
         f"{stage.planets} planets, the {stage.fixed} is fixed, the {stage.driving} drives the {output}, ratio "
@@ -209,6 +210,13 @@ def _texts(stage: PlanetaryStage, speed: float | None) -> Iterator[str]:
     )
     if speed is not None:
         yield f"Mesh frequency {float(mesh_frequency(stage, speed)):.5g} Hz."
+    if concrete(stage.gears.helix_angle):
+        axial = axial_loads(stage, torque)
+        yield (
+            f"The axial force on the sun is {float(jnp.abs(axial.sun)):.4g} N, that on the ring its opposite. Planets "
+            f"have none, but a tilting moment of {float(axial.planet_moment):.4g} N m each on their bearings, by which "
+            "they do not tilt in this analysis."
+        )
     yield (
         "Forces act along the lines of action, without friction. All planets and their teeth are alike but for the "
         "errors of [stage]."

@@ -33,6 +33,7 @@ from .vibration import StageInertias
 
 _GEARS = "sun", "planet", "ring"
 _FLANKS = "modification", "ring_modification"
+_HAND = "helix_angle"
 _SAMPLES, _MOST_SAMPLES = 32, 4096
 _TORQUES = 9  # over the range of the file
 _FEWEST_POSITIONS = 16  # a multiple of it and of the number of planets
@@ -131,6 +132,9 @@ class StageSection(FurtherTable, section_of(PlanetaryStage, ("gears",), open=Fal
             given = [planet[name] for name in _FLANKS if name in planet]
             planet = {key: value for key, value in planet.items() if key not in _FLANKS}
             planet |= {"modification": given[-1]} if given else {}
+            sun = content["sun"].get(_HAND) if isinstance(content["sun"], dict) else None
+            if _HAND not in planet and isinstance(sun, int | float):
+                planet[_HAND] = -sun
         pair |= {"pinion": planet, "ring": content["ring"]}
         variables = content.get("variables")
         if isinstance(variables, dict):

@@ -221,7 +221,7 @@ class TeethDeviations(Checked):
         if self.flanks is not None:
             found += terms(jax.tree.map(lambda leaf: leaf[tooth], self.flanks))
         if self.undulations:
-            slope = None if gear.is_spur else jnp.tan(gear.base_helix_angle)
+            slope = None if gear.is_spur else jnp.tan(gear.signed(gear.base_helix_angle))
             amplitude, order, phase = (
                 jnp.stack([getattr(wave, name) for wave in self.undulations])
                 for name in ("amplitude", "order", "phase")
