@@ -227,4 +227,4 @@ def test_contact_runs_over_the_face_of_both_meshes_alike():
     opens = [jg.LeadSlope(-tilt * width * jnp.cos(angle)) for angle in right.stage.gears.working_pressure_angles]
     held = solve_stage(tilted, 400.0, sun=opens[0], ring=opens[1])
     np.testing.assert_allclose(held.transmission_error, error[0], rtol=1e-9)
-    assert np.abs(solve_stage(tilted, 400.0).transmission_error - error[0]).max() > 0.5
+    assert np.abs(solve_stage(tilted, 400.0).transmission_error - error[0]).max() > 0.2

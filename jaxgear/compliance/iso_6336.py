@@ -79,7 +79,7 @@ def single_stiffness(pair: GearPair, line_load: Scalar) -> tuple[Scalar, Scalar]
 
 def _tooth_dedendum(gear: Gear) -> Scalar:
     """Coefficient of the dedendum as cut, h_fP + x - x_E, of the basic rack factor C_B."""
-    if gear.cutter_teeth is not None:  # that of the rack which cuts as deep
+    if gear.is_internal or gear.cutter_teeth is not None:  # that of the rack which cuts as deep
         return gear.profile_shift + (gear.pitch_radius - gear.root_circle_radius) / gear.module
     return gear.dedendum + gear.profile_shift - gear.generating_profile_shift
 

@@ -51,6 +51,8 @@ class Curves(NamedTuple):
         lean: inclination of the flank of the tool's protuberance [rad]; None without protuberance.
         climb: depth along that flank over g [mm/rad]; likewise.
         cutter_radius: generating pitch radius of the cutter [mm]; None for a rack.
+        arc_angle: angle of the centre of a given fillet arc from the tooth centreline [rad], whose radius is the pitch
+            radius; None for the fillet of a tool.
     """
 
     pitch_radius: Real
@@ -64,6 +66,7 @@ class Curves(NamedTuple):
     lean: Real | None = None
     climb: Real | None = None
     cutter_radius: Real | None = None
+    arc_angle: Real | None = None
 
     def over(self, shape: tuple[int, ...]) -> "Curves":
         """Curves with all numbers broadcast to the shape of the points."""
@@ -72,6 +75,8 @@ class Curves(NamedTuple):
 
     def trochoid(self, g: Real) -> tuple[Real, Real]:
         """Point (x, y) [mm] of the fillet at the parameter g [rad]."""
+        if self.arc_angle is not None:
+            return self._along_normal(g, self.arc_angle, self.rounding)
         r, along, depth, rounding = self.pitch_radius, self.offset, self.depth, self.rounding
         if self.lean is not None and self.climb is not None:
             up = self.climb * jnp.maximum(self.lean - g, 0.0)
@@ -176,7 +181,12 @@ def curves(gear: Gear) -> Curves:
     """Numbers that define trochoid and involute of a gear."""
     at_base = half_tooth_angle(gear, jnp.zeros_like(gear.base_radius))
     stretch = None if gear.helix_angle is None else 1 / gear.helix_cosine
-    cutter = gear.cutter
+    arc, cutter = gear.fillet_arc, gear.cutter
+    if arc is not None:
+        center, zero = gear.signed(arc.center_radius), jnp.zeros_like(gear.base_radius)
+        radius, angle = gear.signed(gear.root_circle_radius) - arc.center_radius, gear.signed(arc.angle)
+        known = center, gear.base_radius, at_base, gear.tip_roll_length, zero, zero, radius
+        return Curves(*known, arc_angle=angle)
     if cutter is not None:
         drawn = cutter.offset, cutter.depth, cutter.rounding
         roll = cutter.gear_pitch_radius
@@ -218,11 +228,15 @@ def involute_point(gear: Gear, rho: Real) -> tuple[Real, Real]:
 
 def _generating_angle(gear: Gear) -> Scalar:
     """Parameter g at which fillet and involute meet without undercut [rad]: alpha_t, or alpha_w0 of a cutter."""
+    if gear.fillet_arc is not None:
+        return jnp.arctan(gear.fillet_arc.tangent)
     return gear.transverse_pressure_angle if gear.cutter is None else jnp.arctan(gear.cutter.tangent)
 
 
 def _tangential_form_roll_length(gear: Gear) -> Scalar:
     """Roll length of the junction at g = pressure angle [mm], of d_Ff in ISO 21771; negative in undercut."""
+    if gear.fillet_arc is not None:
+        return gear.signed(gear.fillet_arc.form_roll_length)
     if gear.cutter is not None:
         return gear.cutter.form_roll_length
     alpha, rounded = gear.transverse_pressure_angle, 1 - jnp.sin(jnp.deg2rad(gear.pressure_angle))

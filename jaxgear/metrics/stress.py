@@ -183,6 +183,11 @@ def critical_section(gear: Gear) -> CriticalSection:
     That of helical gears is in the normal section.
     """
     gear = _of_normal_section(gear)
+    if gear.fillet_arc is not None:
+        drawn = curves(gear)
+        assert drawn.arc_angle is not None
+        x, y = drawn.trochoid(drawn.arc_angle + jnp.asarray(_RING_TANGENT))
+        return CriticalSection(2 * x, drawn.rounding, y)
     if gear.cutter is not None:
         tangent = _RING_TANGENT if gear.is_internal else _TANGENT
         return _section_by_cutter(curves(gear), jnp.full_like(gear.module, tangent))

@@ -77,6 +77,8 @@ def write_rexs(
         raise ValueError(f"write_rexs: axial_offset = {float(pair.axial_offset):g} mm {problem}")
     check_rim(pair, "write_rexs")
     for name, gear in zip(_NAMES, pair.gears):
+        if gear.fillet_arc is not None:
+            raise ValueError(f"write_rexs: {name} fillet_radius: must be left out, fillets are written by their tools")
         if gear.protuberance is not None:
             raise ValueError(f"write_rexs: {name} protuberance: must be left out, it is not written yet")
         if gear.cutter_teeth is not None and not gear.is_internal:
