@@ -195,6 +195,7 @@ OF_ANY_TYPE = {
     "io/tables.py FurtherTable.findings": "likewise",
     "io/tables.py FurtherTable.part": "likewise",
     "io/tables.py FurtherTable.quantity": "likewise",
+    "io/tables.py FurtherTable.whole_of": "likewise",
     "io/template.py Template.build": "makes an object of the class that the template names",
     "rexs/model.py checked_object": "data of a file, of any type",
     "studies/registry.py load": "a class of a file that is imported when it is asked for",
@@ -254,9 +255,11 @@ TORQUE_BY_KEYWORD = {
     "dimensionless/model.py dimensionless_model": "that of an excitation",
     "io/gearbox.py support_of": "one of the keys of a file",
     "io/write_design.py write_design": "likewise: a file may do without most of them",
+    "io/write_design.py write_stage_design": "likewise",
     "io/write_design.py write_starter": "likewise",
     "planetary/starter.py write_stage_starter": "likewise",
     "rexs/write.py write_rexs": "likewise",
+    "rexs/write_planetary.py write_rexs_stage": "likewise",
     "rexs/convert.py convert": "likewise",
 }
 

@@ -206,14 +206,9 @@ def test_vibration_of_a_stage_needs_the_inertia_of_its_carrier(tmp_path):
 
 
 def test_what_knows_a_pair_alone_says_so(tmp_path):
-    """A study of the mesh of sun and planet tells it, and no other format takes it for the stage."""
+    """A study of the mesh of sun and planet tells it."""
     design = load(tmp_path)
     assert ExportStudy.of(design).omits().startswith("the mesh of sun and planet alone")
-    result = CliRunner().invoke(app, ["convert", str(design.path), str(tmp_path / "stage.rexs")])
-    assert isinstance(result.exception, DesignFileError) and "stage: REXS is written of single pairs" in str(
-        result.exception
-    )
-    assert not (tmp_path / "stage.rexs").exists()
 
 
 def test_tilted_pins_need_slices(tmp_path):

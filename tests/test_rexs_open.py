@@ -179,7 +179,7 @@ def test_the_stages_of_a_file_and_why_they_are_not_converted(tmp_path, whole):
     path.write_text(without(whole, tools=False).replace("</components>", f"{others}</components>"))
     found = {each.id: each for each in rexs_stages(path)}
     assert [found[2].teeth, found[2].module, found[2].center_distance, found[2].problem] == [(19, 48), 3.0, 100.5, ""]
-    assert "planetary stage" in found[20].problem and "bevel gears" in found[21].problem
+    assert "one sun and one ring" in found[20].problem and "bevel gears" in found[21].problem
     assert found[22].problem == "cylindrical_stage 22: gear_1: missing"
     done = call("convert", path)
     head, *rows = done.out.splitlines()

@@ -24,7 +24,6 @@ R1, R2 = 236.4, 211.8  # outer diameters of the rim
 BETWEEN, AT = SupportArcs(6, 6.0, first=30.0), SupportArcs(6, 6.0)
 RELIEF, NO_RELIEF = (jg.TipRelief(amount, 4.0, jg.Linear()) for amount in (10.0, 0.0))
 PITCH = 360.0 / 64
-SIZE = jg.Resolution(positions=64, pairs=4)
 
 
 def on(support, rim_diameter=R2):
@@ -33,7 +32,7 @@ def on(support, rim_diameter=R2):
 
 
 def prepared(support, rim_diameter=R2):
-    return jg.prepare(on(support, rim_diameter), compliance=default_compliance("stress"), resolution=SIZE)
+    return jg.prepare(on(support, rim_diameter), compliance=default_compliance("stress"))
 
 
 @pytest.mark.parametrize(

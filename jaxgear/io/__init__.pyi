@@ -25,3 +25,4 @@ from .settings_tables import WearSection as WearSection
 from .sweep_table import SweepSection as SweepSection
 from .teeth_table import teeth_of as teeth_of
 from .write_design import write_design as write_design
+from .write_design import write_stage_design as write_stage_design

@@ -10,10 +10,12 @@ import inspect
 import sys
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar, NamedTuple, Self
 
 from ..contact import MeshCycle, OperatingPoint
+from ..geometry import GearPair
 from ..metrics import Finding, Quantity
+from ..microgeometry import AbstractModification
 from ..numerics import Checked, Number
 from ..provided import provided
 from .errors import DesignFileError, join, referring
@@ -51,6 +53,24 @@ class LoadSection(section_of(OperatingPoint)):  # type: ignore[misc]
 
     torque: float | Free = entry(_either_side(), ...)
     torque_range: list[float] | None = entry(list_of(positive("N m"), length=2))
+
+
+class Whole(NamedTuple):
+    """Gears and load of what a pair is a part of.
+
+    Attributes:
+        pairs: all its pairs, that of the file first.
+        flanks: modifications of pinion and wheel of every pair.
+        quality_classes: flank tolerance classes of pinion and wheel of every pair; None for a pair without.
+        torque: torque on its driving member [N m].
+        speed: speed of its driving member [rpm]; None for none.
+    """
+
+    pairs: tuple[GearPair, ...]
+    flanks: tuple[tuple[AbstractModification, AbstractModification], ...]
+    quality_classes: tuple[tuple[int, int] | None, ...]
+    torque: float
+    speed: float | None
 
 
 class FurtherTable(FileTable):
@@ -98,6 +118,15 @@ class FurtherTable(FileTable):
             content: content of the file.
         """
         return design
+
+    def whole_of(self, design: Any, parameters: Mapping[str, Any]) -> Whole:
+        """All gears of the whole that the pair is a part of, for a table that says `whole`.
+
+        Args:
+            design: the `DesignFile`.
+            parameters: value of every free parameter.
+        """
+        raise NotImplementedError(f"[{self.table}] is not about several pairs")
 
     @property
     def value(self) -> object:

@@ -211,27 +211,99 @@ def write_design(
     Raises:
         ValueError: for a torque that is not positive, a ring gear with a support, or where the file cannot be written.
     """
-    check("torque", torque, "N m", low=0.0, open_low=True)
     check_rim(pair, "write_design")
-    lines = [f"title = {_text(printable(title))}", ""] if title else []
     names = "pinion", "ring" if pair.wheel.is_internal else "wheel"
-    for name, gear, quality in zip(names, pair.gears, quality_classes or (None, None)):
-        classes = [] if quality is None else [f"quality_class = {quality}  # ISO 1328-1"]
-        lines += [f"[{name}]", *_gear(gear), *classes, ""]
-    mounting = []
-    if pair.center_distance is not None:
-        mounting.append(f"center_distance = {_value(pair.center_distance)}  # mm")
-    if float(pair.axial_offset) != 0:
-        mounting.append(f"axial_offset = {_value(pair.axial_offset)}  # mm")
-    lines += ["[pair]", *mounting, ""] if mounting else []
-    lines += ["[load]", f"torque = {_value(torque)}  # N m, on the pinion"]
-    lines += [f"speed = {_value(speed)}  # rpm, of the pinion"] if speed is not None else []
-    for name, modification in zip(names, (pinion, wheel)):
+    mounting = {} if pair.center_distance is None else {"center_distance": pair.center_distance}
+    mounting |= {"axial_offset": pair.axial_offset} if float(pair.axial_offset) != 0 else {}
+    _write(
+        path,
+        title,
+        dict(zip(names, pair.gears)),
+        _classes(names, quality_classes),
+        {"pair": [_line(name, value, "mm") for name, value in mounting.items()]},
+        (torque, speed, "the pinion"),
+        {f"{name}.modification": flank for name, flank in zip(names, (pinion, wheel))},
+    )
+
+
+def write_stage_design(
+    path: str | Path,
+    sun_planet: GearPair,
+    planet_ring: GearPair,
+    *,
+    stage: Mapping[str, Any],
+    units: Mapping[str, str],
+    torque: float,
+    flanks: Mapping[str, AbstractModification],
+    speed: float | None = None,
+    quality_classes: tuple[int, int, int] | None = None,
+    title: str = "",
+) -> None:
+    """Write a design file of a planetary stage as a whole or not at all, in place of an earlier one.
+
+    Args:
+        path: path of the TOML file.
+        sun_planet, planet_ring: the pairs, of concrete numbers.
+        stage: values of the table [stage] by their keys.
+        units: units of its numbers by their keys.
+        torque: torque on the driving member [N m].
+        flanks: modifications of the flanks by the names sun, planet_to_sun, planet_to_ring and ring.
+        speed: speed of the driving member [rpm].
+        quality_classes: flank tolerance classes of sun, planet and ring (ISO 1328-1:2013).
+        title: free text.
+
+    Raises:
+        ValueError: for a torque that is not positive, a ring gear with a support, or where the file cannot be written.
+    """
+    check_rim(planet_ring, "write_stage_design")
+    names = "sun", "planet", "ring"
+    headings = "sun.modification", "planet.modification", "planet.ring_modification", "ring.modification"
+    keys = _classes(names, quality_classes)
+    if describe(flanks["planet_to_sun"]) and not describe(flanks["planet_to_ring"]):
+        keys["planet"] = [*keys.get("planet", []), "ring_modification = []  # without it that of both flanks"]
+    _write(
+        path,
+        title,
+        dict(zip(names, (*sun_planet.gears, planet_ring.wheel))),
+        keys,
+        {
+            "pair": [_line("center_distance", sun_planet.working_center_distance, "mm")],
+            "stage": [_line(name, value, units.get(name, "")) for name, value in stage.items()],
+        },
+        (torque, speed, "the driving member"),
+        dict(zip(headings, (flanks[name] for name in ("sun", "planet_to_sun", "planet_to_ring", "ring")))),
+    )
+
+
+def _write(
+    path: str | Path,
+    title: str,
+    gears: Mapping[str, Gear],
+    keys: Mapping[str, list[str]],
+    tables: Mapping[str, list[str]],
+    load: tuple[float, float | None, str],
+    flanks: Mapping[str, AbstractModification],
+) -> None:
+    """Write gears with further keys, further tables, load of a member, and modifications by their headings."""
+    torque, speed, member = load
+    check("torque", torque, "N m", low=0.0, open_low=True)
+    lines = [f"title = {_text(printable(title))}", ""] if title else []
+    for name, gear in gears.items():
+        lines += [f"[{name}]", *_gear(gear), *keys.get(name, []), ""]
+    for name, of_table in tables.items():
+        lines += [f"[{name}]", *of_table, ""] if of_table else []
+    lines += ["[load]", f"torque = {_value(torque)}  # N m, on {member}"]
+    lines += [f"speed = {_value(speed)}  # rpm, of {member}"] if speed is not None else []
+    for heading, modification in flanks.items():
         for term in describe(modification):
-            lines += ["", f"[[{name}.modification]]", *_term(term)]
+            lines += ["", f"[[{heading}]]", *_term(term)]
     text = "\n".join(lines) + "\n"
     with writing(path):
         write_durably(Path(path), lambda file: file.write(text.encode("utf-8")))
+
+
+def _classes(names: Iterable[str], quality_classes: Iterable[int] | None) -> dict[str, list[str]]:
+    return {name: [f"quality_class = {each}  # ISO 1328-1"] for name, each in zip(names, quality_classes or ())}
 
 
 def check_rim(pair: GearPair, owner: str) -> None:

@@ -14,7 +14,7 @@ from ..contact import MeshCycle
 from ..io.design_file import DesignFile, FileDesign, design_of
 from ..io.errors import DesignFileError, calling, join, refused
 from ..io.table_keys import entry, section_of, template_of
-from ..io.tables import FurtherTable
+from ..io.tables import FurtherTable, Whole
 from ..io.value_types import SEED, count, positive, real
 from ..metrics import Quantity
 from ..microgeometry import AbstractModification, NoModification
@@ -177,6 +177,21 @@ class StageSection(FurtherTable, section_of(PlanetaryStage, ("gears",), open=Fal
             _load=design._load.having(**load),
         )
 
+    def whole_of(self, design: DesignFile, parameters: Mapping[str, Any]) -> Whole:
+        """Pairs of sun and planet and of planet and ring, under the load of the driving member."""
+        flanks = of_design(*design.design(parameters))
+        none = NoModification()
+        return Whole(
+            pairs=(design.pair(), self._outer.pair()),
+            flanks=tuple((one or none, other or none) for one, other in (flanks.at_sun, flanks.at_ring)),
+            quality_classes=(design.quality_classes, self._outer.quality_classes),
+            torque=float(driving_torque(self._stage, self.planets * design.torque)),
+            speed=self._driving_speed(design),
+        )
+
+    def _driving_speed(self, design: DesignFile) -> float | None:
+        return None if design.speed is None else float(driving_speed(self._stage, design.speed))
+
     def check(self, design: DesignFile) -> None:
         """Refuses flanks that carry nothing, and pairs that differ."""
         for name, section in (("pin_samples", self.pin_samples), ("seed", self.seed)):
@@ -247,8 +262,7 @@ class StageSection(FurtherTable, section_of(PlanetaryStage, ("gears",), open=Fal
         driving = driving_torque(self._stage, self.planets * torques)
         unmodified, modified = stages_over_torques(settings.prepared, driving, flanks)
         cycles = {"unmodified": unmodified, name: modified}
-        speed = None if design.speed is None else float(driving_speed(self._stage, design.speed))
-        return part(settings, cycles, speed, design.friction)
+        return part(settings, cycles, self._driving_speed(design), design.friction)
 
 
 def _names(content: object) -> set[str]:

@@ -13,13 +13,13 @@ def convert(
     target: Annotated[
         Path | None, typer.Argument(metavar="OUT", help="The other kind of file; none to list the stages of IN.")
     ] = None,
-    stage: Annotated[int | None, typer.Option(metavar="ID", help="Cylindrical stage, where there are several.")] = None,
+    stage: Annotated[int | None, typer.Option(metavar="ID", help="Stage, where there are several.")] = None,
     flank: Annotated[
         Literal["left", "right"] | None, typer.Option(help="Flanks that touch, where both are modified differently.")
     ] = None,
     load_case: Annotated[int | None, typer.Option(metavar="ID", help="Load case, where there are several.")] = None,
     torque: Annotated[
-        float | None, typer.Option(metavar="NM", help="Torque on the pinion in N m, in place of that of a REXS file.")
+        float | None, typer.Option(metavar="NM", help="Torque on the driving gear in N m, in place of the file's.")
     ] = None,
     given: Annotated[
         list[str] | None,

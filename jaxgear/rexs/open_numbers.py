@@ -42,8 +42,7 @@ CUTTER = {
 }
 STAGE = {"center_distance": ("center_distance", "mm")}
 OFFSET = "pair.axial_offset"  # for which REXS has no place
-_KEYS = [f"{gear}.{name}" for gear in ("pinion", "wheel") for name in (GEAR | FLANK | TOOL)]
-_KEYS += ["pair.center_distance", OFFSET]
+PAIR = "pinion", "wheel"
 
 
 def attributes(keys: Mapping[str, tuple[str, str]], gear: Gear, **others: object) -> dict[str, tuple[Any, str]]:
@@ -62,16 +61,22 @@ class Completed:
 
     Attributes:
         given: by their keys, in the units of a design file.
+        gears: names of the gears that the keys may begin with.
+        further: further keys, beside the centre distance of the gears.
         numbers: given and completed ones in words, by their keys.
     """
 
     given: Mapping[str, float]
+    gears: tuple[str, ...] = PAIR
+    further: tuple[str, ...] = (OFFSET,)
     numbers: dict[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        known = [f"{gear}.{name}" for gear in self.gears for name in (GEAR | FLANK | TOOL)]
+        known += ["pair.center_distance", *self.further]
         for key in self.given:
-            if key not in _KEYS:
-                raise DesignFileError("", not_known(key, _KEYS))
+            if key not in known:
+                raise DesignFileError("", not_known(key, known))
 
     def of(self, owner: str, part: Component, keys: Mapping[str, tuple[str, str]]) -> Component:
         """Component with the given numbers of its owner (pinion, wheel or pair) in place of its own."""

@@ -1,7 +1,7 @@
-"""Reads a gear pair with its modifications and its load from a REXS file, and lists the stages of one."""
+"""Reads a gear pair with its modifications and its load from a REXS file."""
 
 import logging
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import reduce
 from operator import add
@@ -20,7 +20,7 @@ from .forms import parse
 from .frame import Frame, frames
 from .gears import QUALITY, is_internal, read_gear, read_quality
 from .model import Component, Model
-from .open_numbers import FLANK, GEAR, OFFSET, STAGE, Completed
+from .open_numbers import FLANK, GEAR, OFFSET, PAIR, STAGE, Completed
 from .points import joined
 
 _LOG = logging.getLogger("jaxgear")
@@ -31,7 +31,6 @@ _ACTIVE_TIP = "active_tip_diameter"
 _TIPS = "tip_diameter", "tip_form_diameter"
 _ROUNDED = 5e-3  # mm, by which diameters that another program works out may differ
 _LISTED = "; jaxgear convert FILE lists its stages"
-_NAMES = "pinion", "wheel"
 _ALONG, _ACROSS = "position_of_profile_modification", "diameter_of_helix_modification"
 _GEOMETRY = (
     "normal_pressure_angle",
@@ -106,6 +105,12 @@ def read_rexs(
         model = parse(content(file))
         completed = Completed(given or {})
         found = _read(model, stage, flank, load_case, completed)
+    log_completed(file, model, completed)
+    return found
+
+
+def log_completed(file: Path, model: Model, completed: Completed) -> None:
+    """Log the numbers beside those of a file, and where it names no units."""
     said = (part for several in (model.components, *model.cases.values()) for part in several.values())
     if completed.numbers:
         shown = ", ".join(f"{key} = {value}" for key, value in completed.numbers.items())
@@ -114,15 +119,18 @@ def read_rexs(
     if silent:
         shown = f"{silent[0]}, the first of {len(silent)}" if len(silent) > 1 else silent[0]
         _LOG.warning("%s: names no units, those of the REXS standard are taken: %s", file, shown)
-    return found
 
 
 def _read(model: Model, stage: int | None, flank: str | None, load_case: int | None, completed: Completed) -> RexsPair:
     found = read_stage(model, stage, flank, completed)
     torque, speed = _load(model, found.stage, found.gears[0], load_case)
+    return RexsPair(title_of(model), found.pair, *found.modifications, torque, speed, quality_of(found.gears))
+
+
+def title_of(model: Model) -> str:
+    """Name of the model, "" where it has none."""
     units = [part for part in model.components.values() if part.type == "gear_unit"]
-    title = units[0].text("model_name") if units else ""
-    return RexsPair(title, found.pair, *found.modifications, torque, speed, _classes(found.gears))
+    return units[0].text("model_name") if units else ""
 
 
 class Stage(NamedTuple):
@@ -146,38 +154,72 @@ def read_stage(model: Model, stage: int | None, flank: str | None, completed: Co
     Raises:
         DesignFileError: where it is no pair of the library.
     """
-    chosen = completed.of("pair", _stage(model, stage), STAGE)
-    gears = _with_given(model, _driving_first(model, chosen), completed)
+    chosen = _stage(model, stage)
+    gears = _driving_first(model, chosen)
+    flank = loaded_side(model, chosen, gears) if flank is None else flank
+    return read_pair(model, chosen, gears, flank, completed, PAIR)
+
+
+def read_pair(
+    model: Model,
+    stage: Component,
+    gears: list[Component],
+    flank: str | None,
+    completed: Completed,
+    names: tuple[str, str],
+    seen: str | None = None,
+) -> Stage:
+    """The pair of both gears of a cylindrical stage.
+
+    Args:
+        model: the file.
+        stage: the stage.
+        gears: its gears, pinion first.
+        flank: side of the flanks that touch; None where the file names none.
+        completed: numbers beside the file.
+        names: names of the gears that keys of a design file begin with.
+        seen: side that face coordinates go by, see `read_rexs`; None for that of the flanks.
+
+    Raises:
+        DesignFileError: where it is no pair of the library.
+    """
+    chosen = completed.of("pair", stage, STAGE)
+    gears = _with_given(model, gears, completed, names)
     if all(map(is_internal, gears)):
         raise chosen.refuse("", "has two ring gears, must have one at most")
     _check_version(model)
     _check_axes(gears)
-    flank = _loaded(model, chosen, gears) if flank is None else flank
     flanks = [_flank(model, gear, flank) for gear in gears]
-    pinion, wheel = (read_gear(model, *each, completed) for each in zip(gears, flanks, _NAMES))
+    pinion, wheel = (read_gear(model, *each, completed) for each in zip(gears, flanks, names))
     distance = abs(chosen.needed("center_distance", "mm"))
     offset = completed.given.get(OFFSET, 0.0)
     if OFFSET in completed.given:
         completed.say(OFFSET, offset, "given")
     pair: GearPair = refused(chosen.where(), GearPair, pinion, wheel, distance, axial_offset=offset)
-    pair = _with_active_tips(model, chosen, gears, pair, completed)
+    pair = _with_active_tips(model, chosen, gears, pair, completed, names)
     width, common = float(pair.face_width), chosen.number("common_face_width", "mm")
     if common is not None and abs(common - width) > 1e-6 * width:
         centred = "" if offset else f": the gears are centred on each other, or give --set {OFFSET}=MM"
         raise chosen.refuse("common_face_width", f"{common:g} mm must be the common one, {width:g} mm{centred}")
-    turned = [1, 1] if pair.is_spur else [_mirror(gear, flank) for gear in gears]
+    seen = flank if seen is None else seen
+    turned = [1, 1] if pair.is_spur else [_mirror(gear, seen) for gear in gears]
     sides = [
         (gear, face, replace(frame, mirror=mirror))
         for gear, face, frame, mirror in zip(gears, flanks, frames(pair), turned)
     ]
     on_pinion, on_wheel = (_modification(model, *side) for side in sides)
     if not pair.is_spur:
-        _check_direction(gears, flank, turned, sides, (on_pinion, on_wheel))
+        _check_direction(gears, seen, turned, sides, (on_pinion, on_wheel))
     return Stage(chosen, gears, pair, (on_pinion, on_wheel))
 
 
 def _with_active_tips(
-    model: Model, stage: Component, gears: list[Component], pair: GearPair, completed: Completed
+    model: Model,
+    stage: Component,
+    gears: list[Component],
+    pair: GearPair,
+    completed: Completed,
+    names: tuple[str, str],
 ) -> GearPair:
     """Pair whose flanks end at the active tip diameters of its stage, unless a tip form diameter is given."""
     said = [[(part, part.number(_ACTIVE_TIP, "mm")) for part in _data(model, stage, gear)] for gear in gears]
@@ -185,8 +227,8 @@ def _with_active_tips(
         return pair
     path = path_of_contact(pair)
     ends = path.pinion_roll_length(path.end), path.wheel_roll_length(path.start)
-    for name, parts, end in zip(_NAMES, said, ends):
-        gear = getattr(pair, name)
+    for field, name, parts, end in zip(PAIR, names, said, ends):
+        gear = getattr(pair, field)
         reached = float(diameter(gear, end))
         for part, value in parts:
             if (
@@ -198,14 +240,14 @@ def _with_active_tips(
             if gear.tip_form_diameter is not None:
                 raise part.refuse(_ACTIVE_TIP, f"{value:g} mm must be {reached:.6g} mm, by the tip form diameter")
             ending = refused(part.where(_ACTIVE_TIP), replace, gear, tip_form_diameter=real(abs(value)))
-            pair = refused(part.where(_ACTIVE_TIP), replace, pair, **{name: ending})
+            pair = refused(part.where(_ACTIVE_TIP), replace, pair, **{field: ending})
             completed.say(f"{name}.tip_form_diameter", value, _ACTIVE_TIP)
     return pair
 
 
-def _with_given(model: Model, gears: list[Component], completed: Completed) -> list[Component]:
+def _with_given(model: Model, gears: list[Component], completed: Completed, names: tuple[str, str]) -> list[Component]:
     """Pinion and wheel with the given numbers; the flanks in the model get their given numbers too."""
-    for owner, gear in zip(_NAMES, gears):
+    for owner, gear in zip(names, gears):
         for side in ("left", "right"):
             for flank in model.related("flank", "gear", gear.id, side):
                 model.components[flank.id] = completed.of(owner, flank, FLANK)
@@ -213,7 +255,7 @@ def _with_given(model: Model, gears: list[Component], completed: Completed) -> l
     return [model.components[gear.id] for gear in gears]
 
 
-def _classes(gears: list[Component]) -> tuple[int, int] | None:
+def quality_of(gears: list[Component]) -> tuple[int, int] | None:
     """Flank tolerance classes of both gears; None where neither has one."""
     first, second = (read_quality(gear) for gear in gears)
     if first is None and second is None:
@@ -228,10 +270,10 @@ def _stage(model: Model, wanted: int | None) -> Component:
     stages = {part.id: part for part in model.components.values() if part.type == "cylindrical_stage"}
     if not stages:
         raise DesignFileError("", f"has no cylindrical_stage{_LISTED}")
-    return stages[_chosen("cylindrical_stage", "stage", [*stages], wanted, _LISTED)]
+    return stages[chosen_id("cylindrical_stage", "stage", [*stages], wanted, _LISTED)]
 
 
-def _chosen(kind: str, option: str, known: list[int], wanted: int | None, hint: str = "") -> int:
+def chosen_id(kind: str, option: str, known: list[int], wanted: int | None, hint: str = "") -> int:
     """The wanted id, or the first one if none is wanted; raises where the choice is open."""
     names = ", ".join(map(str, known)) or "none"
     if wanted is None and len(known) > 1:
@@ -261,7 +303,7 @@ def _data(model: Model, stage: Component, gear: Component) -> list[Component]:
     return [part for part in found if gear in model.related("stage_gear_data", "stage_gear_data", part.id, "gear")]
 
 
-def _loaded(model: Model, stage: Component, gears: list[Component]) -> str | None:
+def loaded_side(model: Model, stage: Component, gears: list[Component]) -> str | None:
     """Side of the flanks that touch; None if the file names none."""
     sides = {part.text("loaded_tooth_flank") for gear in gears for part in _data(model, stage, gear)} - {""}
     if len(sides) > 1:
@@ -380,16 +422,21 @@ def _sum(parts: list[Component], frame: Frame) -> AbstractModification:
 
 def _load(model: Model, stage: Component, pinion: Component, wanted: int | None) -> tuple[float | None, float | None]:
     """Torque [N m] and speed [rpm] of the pinion."""
-    none = wanted is None and not model.cases
-    case = {} if none else model.cases[_chosen("load_case", "load_case", [*model.cases], wanted)]
+    case = case_of(model, wanted)
     data = [part.id for part in _data(model, stage, pinion)]
     shafts = [part.id for part in model.related("assembly", "part", pinion.id, "assembly") if part.type == "shaft"]
-    torque = _number_of_case(model, case, data, "torque", "N m")
-    speed = _number_of_case(model, case, [pinion.id, *shafts], "rotational_speed", "1 / min")
+    torque = number_of_case(model, case, data, "torque", "N m")
+    speed = number_of_case(model, case, [pinion.id, *shafts], "rotational_speed", "1 / min")
     return torque, speed
 
 
-def _number_of_case(model: Model, case: dict[int, Component], ids: list[int], name: str, unit: str) -> float | None:
+def case_of(model: Model, wanted: int | None) -> dict[int, Component]:
+    """Components under the load case of an id, or the only one; empty for a file without load cases."""
+    none = wanted is None and not model.cases
+    return {} if none else model.cases[chosen_id("load_case", "load_case", [*model.cases], wanted)]
+
+
+def number_of_case(model: Model, case: dict[int, Component], ids: list[int], name: str, unit: str) -> float | None:
     """Absolute value of a number of the first component that has it, in the load case or else outside it."""
     for number in ids:
         for part in (case.get(number), model.component(number)):
@@ -397,89 +444,3 @@ def _number_of_case(model: Model, case: dict[int, Component], ids: list[int], na
             if value is not None:
                 return abs(value)
     return None
-
-
-_PAIR = "cylindrical_stage"
-_OTHER = {  # kinds of stages without a pair of their own
-    "planetary_stage": "planetary stage with its carrier: its cylindrical stages are pairs of their own",
-    "bevel_stage": "bevel gears, must be cylindrical gears",
-    "worm_stage": "worm gears, must be cylindrical gears",
-}
-
-
-@dataclass(frozen=True)
-class RexsStage:
-    """One stage of a REXS file.
-
-    Attributes:
-        id: id of its component, for `read_rexs` and the option --stage.
-        kind: type of its component.
-        name: name of its component, "" without one.
-        teeth: numbers of teeth, gear 1 first; None if the file gives none.
-        module: normal module of gear 1 [mm]; None if the file gives none.
-        helix_angle: helix angle of gear 1 on the reference cylinder [deg]; None if the file gives none.
-        center_distance: centre distance [mm]; None if the file gives none.
-        completed: descriptions of the numbers that `read_rexs` completes, by their keys in a design file.
-        problem: reason why the stage cannot be read, "" for none.
-    """
-
-    id: int
-    kind: str
-    name: str
-    teeth: tuple[int | None, ...]
-    module: float | None
-    helix_angle: float | None
-    center_distance: float | None
-    completed: Mapping[str, str]
-    problem: str
-
-
-def rexs_stages(path: str | Path) -> tuple[RexsStage, ...]:
-    """Every stage of a REXS file, with the reason why a stage cannot be read.
-
-    Args:
-        path: path of the file, see `read_rexs`.
-
-    Raises:
-        DesignFileError: where the file is not a REXS file.
-    """
-    with naming(Path(path)):
-        model = parse(content(Path(path)))
-        return tuple(_stages_of(model))
-
-
-def _stages_of(model: Model) -> Iterator[RexsStage]:
-    for part in [*model.components.values()]:
-        if part.type.endswith("_stage"):
-            yield _rexs_stage(model, part)
-
-
-def _rexs_stage(model: Model, stage: Component) -> RexsStage:
-    completed, problem = Completed({}), _OTHER.get(stage.type, "" if stage.type == _PAIR else "is not a pair of gears")
-    try:
-        if not problem:
-            read_stage(model, stage.id, None, completed)
-    except DesignFileError as error:
-        problem = ": ".join(part for part in (error.key, error.problem) if part)
-    gears = [gear for role in ("gear_1", "gear_2") for gear in model.related("stage", "stage", stage.id, role)]
-    teeth = tuple(_number(gear, "number_of_teeth", "none") for gear in gears)
-    first = gears[0] if gears else Component(0, "")
-    return RexsStage(
-        id=stage.id,
-        kind=stage.type,
-        name=stage.name,
-        teeth=tuple(None if number is None else int(number) for number in teeth),
-        module=_number(first, "normal_module", "mm"),
-        helix_angle=_number(first, "helix_angle_reference_diameter", "deg"),
-        center_distance=_number(stage, "center_distance", "mm"),
-        completed=completed.numbers,
-        problem=problem,
-    )
-
-
-def _number(part: Component, attribute: str, unit: str) -> float | None:
-    """Number of a component, None if it cannot be read."""
-    try:
-        return part.number(attribute, unit)
-    except DesignFileError:
-        return None

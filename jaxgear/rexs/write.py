@@ -1,5 +1,6 @@
 """Write a gear pair with its modifications, its load and the results of its contact analysis as a REXS file."""
 
+from collections.abc import Sequence
 from pathlib import Path, PurePath
 from typing import Any
 
@@ -21,10 +22,10 @@ from .forms import content_of
 from .frame import frames
 from .gears import write_gear
 from .model import Component, Model
+from .open_numbers import PAIR
 
 _VERSION = "2.0.0"
-_CASE = 1
-_NAMES = "pinion", "wheel"
+CASE = 1
 
 
 def write_rexs(
@@ -70,50 +71,101 @@ def write_rexs(
     check("error", error, "um", low=0.0, open_low=True)
     if cycle is not None:
         pinion, wheel, torque, speed, friction = _of_cycle(pair, cycle, pinion, wheel, torque, speed, friction)
-    if any(isinstance(leaf, jax.core.Tracer) or np.ndim(leaf) for leaf in jax.tree.leaves(pair)):
-        raise ValueError("write_rexs: pair must be one pair of concrete numbers")
-    if float(pair.axial_offset) != 0:
-        problem = "must be 0 mm: a stage of REXS has no place for it"
-        raise ValueError(f"write_rexs: axial_offset = {float(pair.axial_offset):g} mm {problem}")
-    check_rim(pair, "write_rexs")
-    for name, gear in zip(_NAMES, pair.gears):
-        if gear.fillet_arc is not None:
-            raise ValueError(f"write_rexs: {name} fillet_radius: must be left out, fillets are written by their tools")
-        if gear.protuberance is not None:
-            raise ValueError(f"write_rexs: {name} protuberance: must be left out, it is not written yet")
-        if gear.cutter_teeth is not None and not gear.is_internal:
-            problem = f"{float(gear.cutter_teeth):g} must be left out: tools are written as racks alone"
-            raise ValueError(f"write_rexs: {name} cutter_teeth = {problem}")
-    model = Model(_VERSION)
-    title = "".join(letter for letter in title if letter.isprintable())
-    unit = model.add("gear_unit", model_name=(title or None, "none"))
-    stage = model.add(
-        "cylindrical_stage",
-        center_distance=(pair.working_center_distance, "mm"),
-        common_face_width=(pair.face_width, "mm"),
-    )
-    model.relate("assembly", assembly=unit, part=stage)
-    names = zip(pair.gears, _NAMES, quality_classes or (None, None), materials or (None, None))
+    check_pair(pair, "write_rexs")
+    model, unit = new_model(title)
+    stage = write_stage(model, unit, pair)
+    names = zip(pair.gears, PAIR, quality_classes or (None, None), materials or (None, None))
     gears, flanks = zip(*(write_gear(model, *each) for each in names))
-    model.relate("stage", stage=stage, gear_1=gears[0], gear_2=gears[1])
     # of helical gears the ends of the face differ: positive face coordinates are those of right flanks
-    touching: dict[str, Any] = {} if pair.is_spur else {"loaded_tooth_flank": ("right", "none")}
-    data = [
-        model.add("cylindrical_stage_gear_data", is_driving_gear=(first, "none"), **touching) for first in (True, False)
-    ]
-    for gear, part in zip(gears, data):
-        model.relate("stage_gear_data", stage=stage, gear=gear, stage_gear_data=part)
-    for name, both, frame, modification in zip(_NAMES, flanks, frames(pair), (pinion, wheel)):
+    data = write_mesh(model, stage, gears, side=None if pair.is_spur else "right")
+    for name, both, frame, modification in zip(PAIR, flanks, frames(pair), (pinion, wheel)):
         if modification is not None:
             write_modification(model, both, frame, modification, owner=f"write_rexs: {name}", error=error)
     if torque is not None:
         check("torque", torque, "N m", low=0.0)
-        model.under_load(_CASE, data[0], torque=(np.asarray(torque), "N m"))
+        model.under_load(CASE, data[0], torque=(np.asarray(torque), "N m"))
     if speed is not None:
         check("speed", speed, "rpm", low=0.0)
-        model.under_load(_CASE, gears[0], rotational_speed=(np.asarray(speed), "1 / min"))
+        model.under_load(CASE, gears[0], rotational_speed=(np.asarray(speed), "1 / min"))
     if cycle is not None:
-        _write_results(model, data[0], cycle, case=_CASE, speed=speed, friction=friction)
+        _write_results(model, data[0], cycle, case=CASE, speed=speed, friction=friction)
+    write_model(model, path)
+
+
+def check_pair(pair: GearPair, owner: str) -> None:
+    """Raise for a pair that REXS has no place for; `owner` is the function in the message.
+
+    Raises:
+        ValueError: for traced numbers or several pairs, an axial offset, a support of a rim, and tools that are not
+            written.
+    """
+    if any(isinstance(leaf, jax.core.Tracer) or np.ndim(leaf) for leaf in jax.tree.leaves(pair)):
+        raise ValueError(f"{owner}: pair must be one pair of concrete numbers")
+    if float(pair.axial_offset) != 0:
+        problem = "must be 0 mm: a stage of REXS has no place for it"
+        raise ValueError(f"{owner}: axial_offset = {float(pair.axial_offset):g} mm {problem}")
+    check_rim(pair, owner)
+    for name, gear in zip(PAIR, pair.gears):
+        if gear.fillet_arc is not None:
+            raise ValueError(f"{owner}: {name} fillet_radius: must be left out, fillets are written by their tools")
+        if gear.protuberance is not None:
+            raise ValueError(f"{owner}: {name} protuberance: must be left out, it is not written yet")
+        if gear.cutter_teeth is not None and not gear.is_internal:
+            problem = f"{float(gear.cutter_teeth):g} must be left out: tools are written as racks alone"
+            raise ValueError(f"{owner}: {name} cutter_teeth = {problem}")
+
+
+def new_model(title: str) -> tuple[Model, Component]:
+    """A model with a gear unit of a title."""
+    model = Model(_VERSION)
+    title = "".join(letter for letter in title if letter.isprintable())
+    return model, model.add("gear_unit", model_name=(title or None, "none"))
+
+
+def write_stage(model: Model, whole: Component, pair: GearPair, angle: float | None = None) -> Component:
+    """Write the cylindrical stage of a pair as a part of a gear unit or a planetary stage.
+
+    Args:
+        model: the file.
+        whole: gear unit or planetary stage.
+        pair: the gears.
+        angle: direction from gear 1 to gear 2, about the negative u axis [deg]; None for none.
+    """
+    stage = model.add(
+        "cylindrical_stage",
+        center_distance=(pair.working_center_distance, "mm"),
+        common_face_width=(pair.face_width, "mm"),
+        rotating_angle_around_neg_u_axis=(angle, "deg"),
+    )
+    model.relate("assembly", assembly=whole, part=stage)
+    return stage
+
+
+def write_mesh(model: Model, stage: Component, gears: Sequence[Component], *, side: str | None) -> list[Component]:
+    """Write that two gears, pinion first, mesh in a cylindrical stage; returns their components of stage data.
+
+    Args:
+        model: the file.
+        stage: the stage.
+        gears: components of the gears.
+        side: side of the flanks that touch, "left" or "right"; None for either.
+    """
+    model.relate("stage", stage=stage, gear_1=gears[0], gear_2=gears[1])
+    options: dict[str, Any] = {"loaded_tooth_flank": (side, "none")}
+    data = [
+        model.add("cylindrical_stage_gear_data", is_driving_gear=(first, "none"), **options) for first in (True, False)
+    ]
+    for gear, part in zip(gears, data):
+        model.relate("stage_gear_data", stage=stage, gear=gear, stage_gear_data=part)
+    return data
+
+
+def write_model(model: Model, path: str | Path) -> None:
+    """Write the file of a model atomically, in place of an earlier one.
+
+    Raises:
+        ValueError: where it cannot be written.
+    """
     content = content_of(model, PurePath(path))
     with writing(path):
         write_durably(Path(path), lambda file: file.write(content))
