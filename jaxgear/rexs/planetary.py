@@ -94,9 +94,9 @@ def read_rexs_stage(
     with naming(file):
         model = parse(content(file))
         stages = [part.id for part in model.components.values() if part.type == PLANETARY]
-        chosen = model.component(chosen_id(PLANETARY, "stage", stages, stage)) if stages else None
-        if chosen is None:
+        if not stages:
             raise DesignFileError("", f"has no {PLANETARY}")
+        chosen = model.component(chosen_id(PLANETARY, "stage", stages, stage))
         completed = completed_of_stage(given or {})
         found = read_planetary(model, chosen, flank, load_case, completed)
     log_completed(file, model, completed)
@@ -125,7 +125,7 @@ def read_planetary(
     pairs = [_pairs(model, mesh, side, other, completed) for mesh in meshes]
     inner, outer = pairs[0]
     for mesh, (one, two) in zip(meshes, pairs):
-        if not eqx.tree_equal((one.pair, one.modifications, two.pair, two.modifications), _numbers(inner, outer)):
+        if not eqx.tree_equal(_numbers(one, two), _numbers(inner, outer)):
             raise mesh.planet.refuse("", f"differs from planet {meshes[0].planet.id}: all planets must be alike")
     to_sun, to_ring = inner.modifications, outer.modifications
     shafts = _shafts(model, stage, meshes[0])
@@ -252,7 +252,7 @@ def _places(model: Model, meshes: list[PlanetMeshes], side: str | None) -> tuple
 
 def _fixed(model: Model, shafts: Mapping[str, list[int]], completed: Completed) -> str:
     """The member that a coupling holds in the casing."""
-    held = {part for part in _coupled(model)}
+    held = set(_coupled(model))
     found = [name for name in MEMBERS if held.intersection(shafts[name])]
     if len(found) > 1:
         raise DesignFileError("", f"couples {' and '.join(found)} to the casing, must be one of them")
