@@ -21,6 +21,8 @@ teeth = 24
 module = 3.0
 profile_shift = -0.2
 face_width = 18.0
+tip_diameter = 76.8
+bore_diameter = 30.0
 tip_edge_radius = 0.1
 
 [planet]
@@ -28,7 +30,9 @@ teeth = 18
 module = 3.0
 profile_shift = 0.2
 face_width = 18.0
+tip_diameter = 61.2
 bore_diameter = 20.0
+tip_edge_radius = 0.1
 
 [ring]
 teeth = 60
@@ -37,6 +41,8 @@ profile_shift = -0.2
 face_width = 18.0
 cutter_teeth = 25
 root_radius = 0.2
+tip_diameter = 176.4
+tip_edge_radius = 0.1
 rim_diameter = 215.0
 
 [pair]
@@ -253,7 +259,8 @@ def test_helical_stages_come_back(files, tmp_path):
         "rim_diameter", "helix_angle = -12.0\nrim_diameter"
     )
     text = text.replace("center_distance = 63.0\n", f"center_distance = {63 / np.cos(np.deg2rad(12)):.12g}\n")
-    text = text.replace("rim_diameter = 215.0", "rim_diameter = 220.0")
+    for spur, helical in ((76.8, 78.4), (61.2, 62.4), (176.4, 180.4), (215.0, 220.0)):
+        text = text.replace(f"diameter = {spur}", f"diameter = {helical}")
     text += '\n[[planet.modification]]\ntype = "lead_slope"\namount = 5.0\n'
     (tmp_path / "stage.toml").write_text(text)
     convert(tmp_path / "stage.toml", tmp_path / "stage.rexs", **OPTIONS)
