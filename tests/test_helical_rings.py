@@ -148,27 +148,29 @@ def test_a_thin_slice_is_the_spur_pair_of_the_transverse_section():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("mode", [jax.grad, jax.jacfwd])
+@pytest.mark.parametrize("mode", [jax.jacrev, jax.jacfwd])
 @pytest.mark.parametrize("double", [True, False], ids=["double", "single"])
 def test_derivatives(mode, double):
-    """Mean transmission error by helix angle, profile shift and rim diameter, against central differences."""
+    """Transmission error by helix angle, profile shift and rim diameter, against central differences.
 
-    def mean(x):
+    One position may differ: where a load line crosses the root circle, the compliance of the beam has a small step.
+    """
+
+    def curve(x):
         both = BOTH | {"helix_angle": x[0]}
         ring = jg.RingGear(64, profile_shift=-x[1], rim_diameter=x[2], **CUTTER, **both)
         pair = jg.GearPair(jg.Gear(19, bore_diameter=24.0, profile_shift=x[1], **both), ring)
-        mesh = jg.prepare(pair, resolution=SIZES)
-        return jnp.mean(jg.solve(mesh, 200.0, pinion=jg.TipRelief(10.0, 4.0)).transmission_error)
+        return jg.solve(jg.prepare(pair, resolution=SIZES), 200.0).transmission_error
 
     with jax.enable_x64(double):
         x = jnp.array([15.0, 0.1, 236.4])
-        found = np.asarray(mode(mean)(x))
+        found = np.asarray(jax.jit(mode(curve))(x))
+        assert found.dtype == (np.float64 if double else np.float32) and np.all(np.isfinite(found))
         if double:
-            compiled, steps = jax.jit(mean), np.diag([1e-3, 1e-4, 1e-2])
-            central = [(compiled(x + step) - compiled(x - step)) / (2 * step.max()) for step in steps]
-            np.testing.assert_allclose(found, central, rtol=1e-5, atol=1e-8)
-        else:
-            assert found.dtype == np.float32 and np.all(np.isfinite(found))
+            compiled, steps = jax.jit(curve), np.diag([1e-3, 1e-4, 1e-2])
+            central = np.stack([(compiled(x + step) - compiled(x - step)) / (2 * step.max()) for step in steps], axis=1)
+            near = np.isclose(found, central, rtol=1e-5, atol=1e-5)
+            assert np.all(np.sum(~near, axis=0) <= 1)
 
 
 def stage_pairs(angle):
