@@ -29,6 +29,8 @@ public names are listed in `__init__.pyi`, and what one needs is imported when i
 
 import lazy_loader
 
+from . import provided as _provided
+
 _named, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
 
 
@@ -40,5 +42,7 @@ def __getattr__(name: str):
 
         return metadata.version(__name__)
     if name not in __all__:
+        if name in (given := _provided.provided("functions")):
+            return given[name].load()
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     return _named(name)

@@ -25,9 +25,10 @@ def provided(group: str) -> dict[str, Any]:
     """Entry points by name; the folders of this package come first.
 
     Args:
-        group: "tables", "quantities", "studies", "commands", "formats" or "starters". A command is a function with the
-            options that `typer` reads from its signature; a format, named by the end of its files, a function that
-            writes a gear pair with the arguments of `write_design`; a starter one that writes a file to begin with.
+        group: "tables", "quantities", "studies", "commands", "formats", "starters" or "functions". A command is a
+            function with the options that `typer` reads from its signature; a format, named by the end of its files, a
+            function that writes a gear pair with the arguments of `write_design`; a starter one that writes a file to
+            begin with; a function one that `jaxgear` has under its name.
     """
     from importlib import metadata  # imported when asked for: it takes longer than the commands need
 

@@ -15,7 +15,7 @@ from jaxgear.provided import provided
 
 PACKAGE = Path(jaxgear.__file__).parent
 # folders of the package that no other one imports
-APPLICATIONS = ("dimensionless", "identification", "layout", "manufacture", "planetary", "rating", "rexs")
+APPLICATIONS = ("dimensionless", "explorer", "identification", "layout", "manufacture", "planetary", "rating", "rexs")
 # imports every module, shows the help and analyzes a pair
 REST = """
 import pathlib, pkgutil, sys, importlib

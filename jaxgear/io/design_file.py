@@ -395,6 +395,16 @@ class DesignFile:
         """Prepared mesh; if numbers of the gears are variables, a function of the parameters that prepares it."""
         return replace(self._mesh, resolution=resolution) if self._mesh.free() else self.mesh(resolution)
 
+    @property
+    def load(self) -> Template:
+        """Torque, speed and friction, with the variables among them open."""
+        return self._load
+
+    @property
+    def misalignment(self) -> Template:
+        """Misalignment of the axes, with the variables in it open; without fields for parallel axes."""
+        return self._mesh.misalignment
+
     def operating_point(self, parameters: Mapping[str, Any]) -> OperatingPoint:
         """Torque, speed and friction; pure and traceable.
 
@@ -425,7 +435,17 @@ def load_design(path: str | Path) -> DesignFile:
     """
     file = Path(path)
     with naming(file):
-        content = given = read(file)
+        return checked(file, read(file))
+
+
+def checked(file: Path, given: dict[str, Any]) -> DesignFile:
+    """Design file with a content in place of that of its file, as `load_design` checks it.
+
+    Raises:
+        DesignFileError: for anything that is wrong with it, in one line that names the file and the key.
+    """
+    with naming(file):
+        content = given
         further = {name: cls for name, cls in further_tables().items() if name not in FileSection.keys}
         used = [cls for name, cls in further.items() if name in content]
         with calling({own: name for cls in used for own, name in cls.called.items()}):

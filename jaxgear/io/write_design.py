@@ -76,6 +76,7 @@ def write_starter(
     pair = starter_pair(teeth, module, face_width, helix_angle, pressure_angle, profile_shift, ring)
     rule = iso_relief(pair, torque)
     amount, length = float(rule.amount), max(float(rule.length), _SHORTEST * module)
+    bounds = relief_bounds(amount, length, module)
     rack = "" if pressure_angle == _PRESSURE_ANGLE else _RACK.format(angle=pressure_angle)
     fillet = _FILLET.format(radius=float(pair.pinion.root_radius)) if pressure_angle < _PRESSURE_ANGLE else ""
     shifts = [_SHIFT.format(shift=shift) if shift else _NO_SHIFT for shift in profile_shift]
@@ -102,12 +103,25 @@ def write_starter(
         hand=_HAND.format(angle=helix_angle, **others) if helix_angle else _SPUR.format(**others),
         speed=speed_line(speed),
         amount=amount,
-        most=max(_MOST * amount, _LEAST_MOST),
+        most=bounds["amount"][1],
         length=length,
-        shortest=min(_SHORTEST * module, 0.5 * length),
+        shortest=bounds["length"][0],
         longest=length + 0.005,  # rounding must not put the value outside
     )
     return pair
+
+
+def relief_bounds(amount: float, length: float, module: float) -> dict[str, tuple[float, float]]:
+    """Bounds of a tip relief that is searched, by the names of its numbers.
+
+    Args:
+        amount, length: those of the rule-based relief [um, mm].
+        module: [mm].
+    """
+    return {
+        "amount": (0.0, max(_MOST * amount, _LEAST_MOST)),
+        "length": (min(_SHORTEST * module, 0.5 * length), length),
+    }
 
 
 def check_new(path: str | Path, torque: float, speed: float | None) -> Path:

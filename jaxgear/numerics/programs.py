@@ -28,6 +28,8 @@ _Found = TypeVar("_Found")
 
 # XLA without its optimizations and without the slower one of its code generators, where a version has two
 OPTIONS: dict[str, Any] = {"xla_backend_optimization_level": 0, "xla_cpu_use_fusion_emitters": False}
+# XLA with the optimizations that `jax_disable_most_optimizations` takes away
+_ALL: dict[str, Any] = {"xla_backend_optimization_level": 3, "xla_llvm_disable_expensive_passes": False}
 
 _everything = False
 
@@ -76,25 +78,27 @@ def _as_array(leaf: Any) -> Any:
     return jnp.asarray(leaf) if type(leaf) in (int, float, complex) or isinstance(leaf, np.generic) else leaf
 
 
-def _jitted(function: Callable[_Given, _Found], always: bool) -> Callable[_Given, _Found]:
-    """`eqx.filter_jit` with the options of `quick_jit`: Python numbers are static."""
+def _jitted(function: Callable[_Given, _Found], always: bool | None) -> Callable[_Given, _Found]:
+    """`eqx.filter_jit` with the options of `quick_jit`: Python numbers are static; None compiles never quickly."""
     full = eqx.filter_jit(function)
 
     @functools.cache
-    def quick() -> Callable[_Given, _Found]:
-        options_of_jax: dict[str, Any] = {"compiler_options": quick_options()}
+    def by_options() -> Callable[_Given, _Found]:
+        options_of_jax: dict[str, Any] = {"compiler_options": _options(always)}
         return eqx.filter_jit(function, **options_of_jax)
 
     @functools.wraps(function)
     def run(*args: _Given.args, **options: _Given.kwargs) -> _Found:
-        return (quick() if _is_quick(always) and is_eager() else full)(*args, **options)
+        return (by_options() if _options(always) is not None and is_eager() else full)(*args, **options)
 
     return run
 
 
-def _is_quick(always: bool) -> bool:
-    """True if a function is compiled quickly, by the option given to `quick_jit`."""
-    return (always or _everything) and quick_options() is not None
+def _options(always: bool | None) -> dict[str, Any] | None:
+    """Options of the compiler by the option given to `quick_jit`; None for its defaults."""
+    if always is None:
+        return _ALL if _everything else None
+    return quick_options() if always or _everything else None
 
 
 @functools.cache
@@ -204,7 +208,7 @@ class ProgramStore:
         self._programs: dict[Any, _Program] = {}
 
     def program(
-        self, function: Callable[..., Any], arguments: PyTree, *, quick: bool
+        self, function: Callable[..., Any], arguments: PyTree, *, quick: bool | None
     ) -> tuple[_Program, list[Any]] | None:
         """The program of a function for some arguments, and the arrays among them; None where JAX traces them."""
         leaves, tree = jax.tree.flatten(arguments)
@@ -219,7 +223,7 @@ class ProgramStore:
             return None
         if known is None:
             known = self._programs[key] = self._made(
-                function, jax.tree.unflatten(tree, fixed), str(precision), quick_options() if _is_quick(quick) else None
+                function, jax.tree.unflatten(tree, fixed), str(precision), _options(quick)
             )
         return known, [leaf for leaf, shape in zip(leaves, fixed) if isinstance(shape, _Shape)]
 
@@ -260,9 +264,14 @@ def keep(store: ProgramStore | None) -> None:
     _store = store
 
 
-def kernel(function: Callable[_Given, _Found]) -> Callable[_Given, _Found]:
-    """`eqx.filter_jit`, for a function that runs for longer than it compiles; kept where a store is in use."""
-    return _compiled(function, quick=False)
+def kernel(function: Callable[_Given, _Found], *, often: bool = False) -> Callable[_Given, _Found]:
+    """`eqx.filter_jit`, for a function that runs for longer than it compiles; kept where a store is in use.
+
+    Args:
+        function: pure function of pytrees.
+        often: True for a function that runs so often that it is optimized even where everything is compiled quickly.
+    """
+    return _compiled(function, quick=None if often else False)
 
 
 def program(function: Callable[_Given, _Found]) -> Callable[_Given, _Found]:
@@ -273,7 +282,7 @@ def program(function: Callable[_Given, _Found]) -> Callable[_Given, _Found]:
     return _compiled(function, quick=True)
 
 
-def _compiled(function: Callable[_Given, _Found], *, quick: bool) -> Callable[_Given, _Found]:
+def _compiled(function: Callable[_Given, _Found], *, quick: bool | None) -> Callable[_Given, _Found]:
     jitted = _jitted(function, always=quick)
 
     @functools.wraps(function)

@@ -299,7 +299,7 @@ def plane_of_action(cycle: MeshCycle, ax: Axes | None = None) -> Axes:
         cycle: solved cycle, of several slices to show more than one row.
         ax: Axes to draw into; None for a new figure.
     """
-    path, _, load = _placed(cycle, cycle.line_load)
+    path, _, load = placed(cycle, cycle.line_load)
     corners = np.stack([path[:-1, :-1], path[1:, :-1], path[:-1, 1:], path[1:, 1:]])[:, np.isfinite(load)]
     contact = cycle.kinematics.path_of_contact
     air = 0.05 * float(contact.base_pitch)
@@ -309,7 +309,7 @@ def plane_of_action(cycle: MeshCycle, ax: Axes | None = None) -> Axes:
 
 def _over_plane(cycle: MeshCycle, values: Array, label: str, limits: tuple[float, float], ax: Axes | None) -> Axes:
     """Map of the values of one pair over its path and the face, with the contact lines of helical gears."""
-    path, face, shown = _placed(cycle, values)
+    path, face, shown = placed(cycle, values)
     with report_axes(ax) as ax:
         colour_bar(_draw(ax, path, face, shown, None), ax, label, pad=0.02)
         for line in _contact_lines(cycle):
@@ -333,7 +333,7 @@ def contact_pattern(cycle: MeshCycle, ax: Panels | None = None) -> np.ndarray:
     Returns:
         the two Axes.
     """
-    path, face, flank = _placed(cycle, cycle.contact_pressure)
+    path, face, flank = placed(cycle, cycle.contact_pressure)
     most = float(np.nanmax(flank, initial=0.0))
     with report_axes(ax, columns=2, width=WIDTH) as panels:
         for panel, title, side, sign in zip(panels, ("pinion", "wheel"), cycle.sides, (1.0, -1.0)):
@@ -349,7 +349,7 @@ def contact_pattern(cycle: MeshCycle, ax: Panels | None = None) -> np.ndarray:
     return np.asarray(panels)
 
 
-def _placed(cycle: MeshCycle, values: Array) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def placed(cycle: MeshCycle, values: Array) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Edges of path positions at the ends of the slices and of the slices [mm], shapes (slices + 1, edges) and (slices
     + 1,), and the values of shape (pairs, slices, positions) between them; NaN where the flanks part.
     """
