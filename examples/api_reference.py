@@ -13,7 +13,7 @@ PACKAGE = Path(__file__).parent.parent / "jaxgear"
 PACKAGES = (
     "geometry microgeometry compliance compliance.finite_element contact shafts metrics tolerance conditions "
     "revolution dynamics rating dimensionless wear manufacture planetary sizing sweeps optimize layout io studies "
-    "report identification rexs plot numerics"
+    "report identification rexs explorer plot numerics"
 ).split()
 _NAMES = re.compile(r" +(?:\w+, )+\w+:")  # with which a line of a docstring begins
 

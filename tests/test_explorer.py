@@ -1,5 +1,7 @@
 """Numbers that move: what a slider shows is what `solve` gives, and its bars are derivatives."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from commands import FIXED, FREE
@@ -129,6 +131,12 @@ def test_values_are_checked(written, values, message):
     assert str(refused.value).startswith(message)
 
 
+def test_a_stage_is_refused():
+    example = Path(__file__).parents[1] / "examples" / "planetary_26_19.toml"
+    with pytest.raises(DesignFileError, match="stage: is more than a pair, and the page shows one"):
+        Opened(example)
+
+
 def test_a_file_that_cannot_be_used_is_one_line(written):
     with pytest.raises(DesignFileError, match="pair.toml: load.torque: "):
         Opened(written(FIXED.replace("torque = 50.0", 'torque = "much"')))
@@ -176,3 +184,24 @@ def test_helical_flanks_and_axes_move(written):
     np.testing.assert_allclose(gradient, np.subtract(*ends[::-1]) / 2e-3, rtol=1e-5, atol=1e-6)
     load = answer["charts"]["plane_of_action"]
     assert len(load["load"]) == 6 and len(load["face"]) == 7
+
+
+@pytest.mark.slow
+def test_gears_move_too(written):
+    text = FREE.replace("teeth = 48", 'teeth = 48\nprofile_shift = "shift"')
+    text = text.replace("[variables]", "[variables]\nshift = { low = -0.2, high = 0.3 }")
+    text = text[: text.index("[optimize]")].replace("pairs = 2\n", "")
+    explorer = Explorer(written(text))
+    explorer.prepare()
+    values = explorer.opened.values | {"shift": 0.1, "height": 8.0}
+    answer = explorer.move(values)
+    design = load_design(written(explorer.opened.text(values).replace('"shift"', "0.1").replace("shift = {", "# {")))
+    pinion, wheel = design.design({"height": 8.0})
+    cycle = jg.solve(design.mesh(explorer._sizes), 50.0, pinion=pinion, wheel=wheel)
+    assert number(explorer, answer, "ppte") == pytest.approx(float(jg.peak_to_peak(cycle.transmission_error)), abs=1e-9)
+    index = list(explorer.opened.sliders).index("shift")
+    ends = [explorer.move(values | {"shift": 0.1 + way})["numbers"] for way in (-1e-5, 1e-5)]
+    gradient = np.asarray(answer["gradient"], float)[:, index]
+    np.testing.assert_allclose(gradient, np.subtract(*ends[::-1]) / 2e-5, rtol=1e-4, atol=1e-5)
+    best = explorer.optimize(values, "ppte", lambda *_: None)
+    assert best["shift"] == 0.1 and number(explorer, explorer.move(best), "ppte") < number(explorer, answer, "ppte")

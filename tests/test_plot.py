@@ -17,6 +17,7 @@ from gearboxes import gearbox
 import jaxgear as jg
 from jaxgear import plot
 from jaxgear.plot.figure import line_style
+from jaxgear.plot.mesh_cycle import two_pitches
 from jaxgear.shafts import elastic_line
 
 pytestmark = pytest.mark.usefixtures("clean_figures")
@@ -445,3 +446,11 @@ def test_shared_axes_of_speed_responses_show_all_curves():
         plot.speed_response({"unmodified": [response]}, "dte_rms", ax)
     assert both[0].get_ylim() == both[1].get_ylim() and both[0].get_ylim()[0] == 0.0 and both[0].get_ylim()[1] > 30.0
     plt.close(figure)
+
+
+@pytest.mark.parametrize("first", [0.0, -0.5, 0.75])
+def test_two_pitches_begin_at_zero_wherever_the_cycle_does(first):
+    phase = first + np.arange(8) / 8
+    shown, curve = two_pitches(phase, np.cos(2 * np.pi * phase))
+    assert (shown[0], shown[-1]) == (0.0, 2.0) and np.all(np.diff(shown) > 0)
+    np.testing.assert_allclose(curve, np.cos(2 * np.pi * shown), atol=1e-12)

@@ -3,8 +3,6 @@
 Needs the extra `explore`. `Explorer` gives the answers without a page.
 """
 
-from .explorer import Explorer as Explorer
-from .notebook import explore as explore
-from .server import Page as Page
-from .sliders import Opened as Opened
-from .sliders import Slider as Slider
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

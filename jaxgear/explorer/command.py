@@ -1,6 +1,5 @@
 """The command `explore` with its options; the library is imported when it runs."""
 
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated
 
@@ -8,9 +7,9 @@ import typer
 
 from ..cli import interrupt
 from ..io.first_look import check_keys
+from .needs import check_installed
 
 _LOOPBACK = "127.0.0.1"
-_NEEDS = "starlette", "uvicorn", "websockets", "plotly", "tomlkit"
 
 
 def explore(
@@ -32,9 +31,7 @@ def explore(
 
     The page is on this machine alone, for who has its link. It needs jaxgear[explore].
     """
-    for module in _NEEDS:
-        if find_spec(module) is None:
-            raise ValueError(f"jaxgear explore needs the library {module}: pip install 'jaxgear[explore]'")
+    check_installed("jaxgear explore")
     check_keys(file)
     with interrupt.importing():
         from . import serve

@@ -26,6 +26,7 @@ from ..optimize import Front
 from ..studies.comparison import rule_based
 from ..studies.manufactured import gears_of
 from ..sweeps import monte_carlo
+from ..tolerance import ManufacturedGears, Tolerance
 from ..vocabulary import quantity_of
 from . import charts
 from .movement import (
@@ -44,11 +45,8 @@ from .sliders import Opened
 _TORQUES = 9  # of the curve over the torque
 _ORDERS = 8
 _POSITIONS, _SLICED_POSITIONS = 512, 128  # at rest, of one slice and of several
-_MOVING, _SLICED, _SLICES = (
-    64,
-    32,
-    11,
-)  # positions of one slice and of several, and slices, at most while a slider moves
+# at most while a slider moves
+_MOVING, _SLICES = 64, 11  # positions and slices
 _GEARS = 100  # manufactured pairs
 _BAND = 0.05, 0.5, 0.95  # quantiles
 _FIRST = "ppte", "mean_te", "max_flank_pressure", "max_corner_pressure", "effective_contact_ratio"
@@ -81,14 +79,13 @@ class Explorer:
         self._fine_sizes = dataclasses.replace(size, positions=max(size.positions, positions))
         self._contacts = contacts_of_slice if self._sizes.slices == 1 else contacts_of_slices
         self._torques = jnp.linspace(*design.torque_range, _TORQUES)
-        gears = gears_of(design, quick=False)
-        self._gears = None if gears is None else dataclasses.replace(gears, samples=_GEARS)
+        self._gears = _manufactured(design)
         self._lock = threading.Lock()
         self.rests = threading.Event()
         self._written: set[Path] = set()
 
     def prepare(self, stage: Callable[[str], None] = lambda text: None) -> None:
-        """Compile what a movement needs, and what manufactured gears need.
+        """Compile what a movement needs.
 
         Args:
             stage: called with every stage of the work.
@@ -104,16 +101,17 @@ class Explorer:
         mesh = self._at.mesh_of(first)
         self._profiles = charts.profiles_of(mesh.sides) if isinstance(self._at.mesh, Mesh) else None
         self._frames = charts.frames(mesh, self._moving(first)[0].cycle, np.asarray(self._torques))
-        if self._gears is not None:
-            stage("compiling what manufactured gears need")
-            self.robust(first)
 
     def prepare_rest(self) -> None:
-        """Compile what a design at rest needs."""
-        self._fine = self._moved(self._fine_sizes)
-        self._rule = rule_based(self.design)
-        self.rest(self.opened.values)
-        self.rests.set()
+        """Compile what a design at rest and manufactured gears need."""
+        try:
+            self._fine = self._moved(self._fine_sizes)
+            self._rule = rule_based(self.design)
+            self.rest(self.opened.values)
+        finally:
+            self.rests.set()  # where it fails, so does every design at rest, and says so
+        if self._gears is not None:
+            self.robust(self.opened.values)
 
     @property
     def design(self) -> DesignFile:
@@ -314,13 +312,12 @@ class Explorer:
         there = [each.name for each in written if each not in self._written and (each.exists() or each.is_symlink())]
         if there:
             raise ValueError(f"name: {there[0]} exists already, choose another name")
-        cycle, mesh = self._solved(self._at, values)
-        flanks = cycle.pinion or NoModification(), cycle.wheel or NoModification()
+        mesh, _, *flanks = self._at(values)
         text = self.opened.text(values)
         self._written.update(written)
         with writing(path):
             write_durably(path, lambda file: file.write(text.encode("utf-8")))
-        write_flanks(path.with_suffix(".csv"), mesh, {path.stem: flanks})
+        write_flanks(path.with_suffix(".csv"), mesh, {path.stem: (flanks[0], flanks[1])})
         return [each.name for each in written]
 
     def path_of(self, name: str) -> Path:
@@ -343,8 +340,18 @@ class Explorer:
 _LONGEST_NAME = 80
 
 
+def _manufactured(design: DesignFile) -> ManufacturedGears | None:
+    """Gears within [tolerance], or else within the classes of both gears; None without either."""
+    given = gears_of(design, quick=False)
+    if given is not None:
+        return dataclasses.replace(given, samples=_GEARS)
+    if design.quality_classes is None:
+        return None
+    tolerance = Tolerance.from_class(design.pair(), quality_class=design.quality_classes)
+    return ManufacturedGears(tolerance if design.resolution().slices > 1 else tolerance.without_lead(), _GEARS)
+
+
 def _coarse(size: Resolution) -> Resolution:
     """Array sizes while a slider moves."""
-    most = _MOVING if size.slices == 1 else _SLICED
-    size = dataclasses.replace(size, positions=min(size.positions, most))
+    size = dataclasses.replace(size, positions=min(size.positions, _MOVING))
     return size if size.slice_widths is not None else dataclasses.replace(size, slices=min(size.slices, _SLICES))

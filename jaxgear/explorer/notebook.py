@@ -1,23 +1,13 @@
 """The page in a notebook."""
 
-from html import escape
 from pathlib import Path
+from typing import Any
 
 from ..io import DesignFile
-from .explorer import Explorer
-from .server import Page
-
-_HEIGHT = 760  # [px]
+from .needs import check_installed
 
 
-class Shown(Page):
-    """A page that a notebook shows under its cell; `link` opens it in a window of its own, `close()` ends it."""
-
-    def _repr_html_(self) -> str:
-        return f'<iframe src="{escape(self.link)}" width="100%" height="{_HEIGHT}" style="border:0"></iframe>'
-
-
-def explore(design: DesignFile | str | Path) -> Shown:
+def explore(design: DesignFile | str | Path) -> Any:
     """Open a page on which sliders move a design, as the command `jaxgear explore` does.
 
     The page runs in threads of this process, on the loopback interface alone. It computes in the precision of JAX,
@@ -27,11 +17,14 @@ def explore(design: DesignFile | str | Path) -> Shown:
         design: design file, or its path.
 
     Returns:
-        the page, which a notebook shows; it is ready some seconds later.
+        the `explorer.Page`, which a notebook shows under its cell: `link` opens it in a window of its own, `close()`
+        ends it. It is ready some seconds later.
 
     Raises:
         DesignFileError: for errors in the file, in one line.
+        ValueError: for a library of the extra `explore` that is missing.
     """
-    page = Shown(Explorer(design.path if isinstance(design, DesignFile) else design))
-    page.start()
-    return page
+    check_installed("jaxgear.explore")
+    from . import serve
+
+    return serve.shown(design.path if isinstance(design, DesignFile) else Path(design))

@@ -1,4 +1,4 @@
-"""The page as a command: it runs until Ctrl-C."""
+"""The page as a command, which runs until Ctrl-C, and in the threads of a notebook."""
 
 import webbrowser
 from pathlib import Path
@@ -12,6 +12,13 @@ from .explorer import Explorer
 from .server import LOOPBACK, Page
 
 _LEAST_TOKEN = 16  # characters
+
+
+def shown(file: Path) -> Page:
+    """Page of a design file that runs in threads of this process."""
+    page = Page(Explorer(file))
+    page.start()
+    return page
 
 
 def serve(file: Path, *, host: str, port: int, token: str | None, browser: bool, cache: bool) -> None:

@@ -14,6 +14,7 @@ import subprocess
 import sys
 import threading
 from collections.abc import Awaitable, Callable, Mapping
+from html import escape
 from pathlib import Path
 from typing import Any
 from urllib.parse import parse_qs
@@ -46,6 +47,7 @@ _HEADERS = {
     "Cache-Control": "no-store",
 }
 _REFUSED = 4403  # code of a WebSocket that is not let in
+_HEIGHT = 760  # in a notebook [px]
 _POLL, _SOON = 0.2, 0.02  # [s]
 
 
@@ -143,6 +145,9 @@ class Page:
             threading.Thread(target=self._server.run, args=([self._socket],), daemon=True),
             threading.Thread(target=self._prepare, daemon=True),
         ]
+
+    def _repr_html_(self) -> str:
+        return f'<iframe src="{escape(self.link)}" width="100%" height="{_HEIGHT}" style="border:0"></iframe>'
 
     def start(self) -> None:
         """Answer from threads in the background."""
@@ -275,7 +280,9 @@ class Connection:
     async def _answered(self, kind: str, message: Mapping[str, Any]) -> None:
         try:
             await self._kinds[kind](message)
-        except (ValueError, OSError) as error:
+        except WebSocketDisconnect:
+            raise
+        except Exception as error:  # noqa: BLE001 - said by the page, which goes on
             await self._refuse(kind, str(error))
 
     async def _movements(self) -> None:
@@ -286,18 +293,17 @@ class Connection:
             message, self._newest = self._newest, None
             if message is None:
                 continue
-            kind = message["kind"]
+            kind, number = message["kind"], message.get("number")
+            if kind == "rest" and not self._explorer.rests.is_set():
+                await self._send({"kind": "stage", "text": "compiling the finer grid", "failed": False})
             try:
                 values = self._explorer.opened.check(message.get("values", {}))
-                if kind == "rest" and not self._explorer.rests.is_set():
-                    await self._send({"kind": "stage", "text": "compiling the finer grid", "failed": False})
-                work = self._explorer.move if kind == "move" else self._rest
-                answer = await asyncio.to_thread(work, values)
-            except ValueError as error:
-                await self._refuse(kind, str(error), message.get("number"))
+                answer = await asyncio.to_thread(self._explorer.move if kind == "move" else self._rest, values)
+            except Exception as error:  # noqa: BLE001 - said by the page, which goes on
+                await self._refuse(kind, str(error), number)
                 continue
             if answer is not None:
-                await self._send({"kind": kind, "number": message.get("number"), **answer})
+                await self._send({"kind": kind, "number": number, **answer})
 
     def _rest(self, values: Mapping[str, float]) -> dict[str, Any] | None:
         while not self._explorer.rests.wait(_SOON):

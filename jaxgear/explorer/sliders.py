@@ -71,9 +71,8 @@ class Opened:
         """
         self.path = Path(path)
         given = load_design(self.path)
-        whole = next((name for name, of in given.tables.items() if getattr(of, "whole", "")), "")
-        if whole:
-            raise DesignFileError(whole, "is more than a pair, and the page shows one: give a file of one mesh", path)
+        for name in given.part_of:
+            raise DesignFileError(name, "is more than a pair, and the page shows one: give a file of one mesh", path)
         self._content = read(self.path)
         try:
             self._text = self.path.read_text(encoding="utf-8-sig")

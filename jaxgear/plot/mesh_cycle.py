@@ -64,15 +64,17 @@ def _path_limits(cycles: Iterable[MeshCycle]) -> tuple[float, float]:
 
 
 def two_pitches(phase: ArrayLike, curve: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
-    """Phase and curve over two base pitches, closed at the end.
+    """Phase and curve over two base pitches from zero on, closed at the end.
 
     Args:
-        phase: equally spaced over one base pitch, shape (positions,).
+        phase: equally spaced over one base pitch, which may begin before zero, shape (positions,).
         curve: periodic values, shape (..., positions).
     """
-    phase, curve = np.asarray(phase), np.asarray(curve)
-    ends = [phase, phase + 1, phase[:1] + 2]
-    return np.concatenate(ends), np.concatenate([curve, curve, curve[..., :1]], axis=-1)
+    places, values = np.mod(np.asarray(phase), 1.0), np.asarray(curve)
+    order = np.argsort(places, kind="stable")
+    places, values = places[order], values[..., order]
+    ends = [places, places + 1, places[:1] + 2]
+    return np.concatenate(ends), np.concatenate([values, values, values[..., :1]], axis=-1)
 
 
 @captioned("Loaded transmission error over two base pitches at the design torque, with its peak-to-peak value (PPTE).")
