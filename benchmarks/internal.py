@@ -2,7 +2,7 @@
 
 import functools
 import json
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -50,13 +50,20 @@ class Errors:
 
 
 TITLES = {"mean": "mean TE \\[%]", "ripple_um": "PPTE \\[um]", "rms": "rms \\[%]"}
-Results = dict[str, dict[str, Errors]]  # by pair with support and plane, then by torque and modification
+Results = dict[str, dict[str, Errors]]  # by pair with support, plane and structure, then by torque and modification
+Structure = Callable[[jg.GearPair, str], jg.compliance.AbstractCompliance]
+FINITE_ELEMENTS = "finite elements"
 
 
 @functools.cache
 def stored() -> dict:
     """Supports, gears, modifications and curves of the reference."""
     return json.loads((REFERENCE / "internal.json").read_text())
+
+
+def closed_form(pair: jg.GearPair, plane: str) -> jg.compliance.AbstractCompliance:
+    """The default structure."""
+    return jg.default_compliance(plane)
 
 
 def gear_pair(name: str, support: str) -> jg.GearPair:
@@ -67,13 +74,14 @@ def gear_pair(name: str, support: str) -> jg.GearPair:
     return jg.GearPair(jg.Gear(**both, **data["planet"]), jg.RingGear(**both, **data["ring"], support=held))
 
 
-def run(name: str, group: str) -> dict[str, Errors]:
+def run(name: str, group: str, structure: Structure = closed_form) -> dict[str, Errors]:
     """Errors of all cycles of a pair; the group is the support and the plane of the reference."""
     support, plane = group.split()
     data = stored()["pairs"][name]
     curves, modifications = data["curves"][group], data["modifications"]
     sizes = jg.Resolution(positions=_POSITIONS, pairs=PAIR_COUNT)
-    mesh = jg.prepare(gear_pair(name, support), compliance=jg.default_compliance(plane), resolution=sizes)
+    gears = gear_pair(name, support)
+    mesh = jg.prepare(gears, compliance=structure(gears, plane), resolution=sizes)
 
     def solved(values):
         torque, amount, length, coefficients = values
@@ -109,8 +117,13 @@ def errors(truth: np.ndarray, phase: np.ndarray, curve: np.ndarray, base_pitch: 
 
 
 def compare() -> Results:
-    """Errors of every cycle."""
-    return {f"{name} {group}": run(name, group) for name, data in stored()["pairs"].items() for group in data["curves"]}
+    """Errors of every cycle; those of rims held all round by the finite-element structure too."""
+    groups = [(name, group) for name, data in stored()["pairs"].items() for group in data["curves"]]
+    found = {f"{name} {group}": run(name, group) for name, group in groups}
+    for name, group in groups:
+        if stored()["supports"][group.split()[0]] is None:
+            found[f"{name} {group}, {FINITE_ELEMENTS}"] = run(name, group, jg.finite_element_compliance)
+    return found
 
 
 def print_internal(results: Results) -> None:

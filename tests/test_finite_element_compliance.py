@@ -159,7 +159,7 @@ def test_the_module_has_no_derivative_beside_a_bore_in_millimetres(tabulated, us
         return jnp.sum(structure_of(tabulated, jg.GearPair(pinion, pair(module=module).wheel), usual))
 
     assert float(found(3.0)) == pytest.approx(float(np.sum(usual.structure)), rel=1e-9)
-    with pytest.raises(ValueError, match="no derivative by module: .* leave both None"):
+    with pytest.raises(ValueError, match="no derivative by module: .* leave them None"):
         jax.grad(found)(3.0)
 
 

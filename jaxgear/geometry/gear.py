@@ -521,12 +521,11 @@ def check_external(*gears: Gear) -> None:
 
 
 def check_spur(*gears: Gear) -> None:
-    """Raise for helical and ring gears, in functions for external spur gears only.
+    """Raise for helical gears, in functions for spur gears only.
 
     Raises:
-        ValueError: for a gear whose helix angle is traced or not zero, and for a ring gear.
+        ValueError: for a gear whose helix angle is traced or not zero.
     """
-    check_external(*gears)
     for gear in gears:
         if not gear.is_spur:
             assert gear.helix_angle is not None

@@ -107,11 +107,12 @@ class RingGear(Gear):
 
     def faults_of(self, shape: Shape) -> tuple[str, ...]:
         faults = super().faults_of(shape)
-        if self.fillet_radius is None or faults:
+        known = None if self.fillet_radius is None else concrete(self.fillet_radius)
+        if known is None or faults:
             return faults
         half = -float(half_tooth_angle(self, jnp.zeros_like(self.base_radius)))
         numbers = float(self.teeth), 0.5 * shape.base, 0.5 * shape.root, half, -float(self.tip_roll_length)
-        most, given = largest_fillet(*numbers), float(self.fillet_radius)
+        most, given = largest_fillet(*numbers), float(known)
         if given <= most * (1 + _ROUNDED):
             return ()
         limit = f"{most:.5g} mm, for which root and flank have room"

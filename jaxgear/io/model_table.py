@@ -78,6 +78,7 @@ _FREE = {
     "density",
     "thermal_contact_coefficient",
 }
+_LENGTHS = "tip_diameter", "bore_diameter", "rim_diameter", "fillet_radius"
 
 
 def model_template(section: ModelSection) -> template.Template:
@@ -113,7 +114,7 @@ def with_tables(
     for free in pair.free():
         name = free.key.rpartition(".")[2]
         moves = name == "module" and any(
-            g.tip_diameter is not None or g.bore_diameter is not None for g in _gears(middle)
+            getattr(g, name, None) is not None for g in _gears(middle) for name in _LENGTHS
         )
         if moves or name not in {*_FREE, "module"}:
             problem = f'cannot be a variable with model.structure = "{FINITE_ELEMENTS}", whose tables are of one shape'

@@ -16,7 +16,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..contact import Side
-from ..geometry import check_spur, outline
+from ..geometry import check_external, check_spur, outline
 from ..geometry.involute import load_angle
 from ..metrics import removed_at
 from ..microgeometry import AbstractModification
@@ -79,6 +79,7 @@ def space_point(
 ) -> tuple[Float[Array, "..."], ...]:
     """Coordinates x, y [mm] and inclination [rad] of points of a flank after the removal of material [um]."""
     gear = side.gear
+    check_external(gear)
     check_spur(gear)
     base = jnp.broadcast_to(gear.base_radius, roll_length.shape)
     angle = jnp.pi / gear.teeth + load_angle(gear, roll_length)

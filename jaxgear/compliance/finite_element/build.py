@@ -26,8 +26,8 @@ class GearNumbers(NamedTuple):
     """Displacements of one gear along the load line under unit line load, for unit module and unit plane modulus.
 
     Attributes:
-        roll_length: from the form circle to the tip, (points,).
-        center: of the crossing of load line and centreline, bore held, (points,).
+        roll_length: from the form circle to the tip, negative for a ring gear, (points,).
+        center: of the crossing of load line and centreline, bore or rim circle held, (points,).
         local: deflection of the flank against that point, beyond the depth-referenced law, (points,).
         neighbours: of the flank of the teeth counter-clockwise of the loaded one, where the load pushes
             counter-clockwise; shape (teeth, loaded point, point of the neighbour).
@@ -52,11 +52,12 @@ def build(shape: Shape, fineness: float = 1.0) -> GearNumbers:
     tooth = Tooth(shape)
     mesh = sector(tooth, fineness)
     rho = np.linspace(tooth.form_roll_length, tooth.tip_roll_length, POINTS)
-    patched = np.sqrt(2 * tooth.base * _readable_arcs(tooth))
+    patched = tooth.roll_length(_readable_arcs(tooth))
     flank, patches = _on_flank(tooth, mesh, rho), _patches(tooth, mesh, patched)
     seen = [flank, _on_centreline(tooth, mesh, rho), _on_flank(tooth, mesh, patched)]
     seen += [_on_centreline(tooth, mesh, patched)]
-    found = responses(mesh, shape.poisson, int(shape.teeth), _together([flank, patches]), _together(seen), NEIGHBOURS)
+    loads, teeth = _together([flank, patches]), int(shape.signed(shape.teeth))
+    found = responses(mesh, shape.poisson, teeth, loads, _together(seen), NEIGHBOURS)
     own = found[0]
     center = np.diagonal(own[POINTS : 2 * POINTS, :POINTS])
     surface, below = (np.diagonal(rows[:, POINTS:]) for rows in np.split(own[2 * POINTS :], 2))
@@ -67,12 +68,12 @@ def build(shape: Shape, fineness: float = 1.0) -> GearNumbers:
 
 
 def hub(shape: Shape) -> float:
-    """Torsion of the ring between bore and root circle on the line of action, for unit plane modulus.
+    """Torsion of the ring between root circle and bore, or rim circle, on the line of action, for unit plane modulus.
 
     (1 + nu) / E is (1 + nu') / E' of the plane problem: see `ElasticRing.hub`.
     """
     tooth = Tooth(shape)
-    return float((1 + shape.poisson) / (2 * np.pi) * tooth.base**2 * (tooth.bore**-2 - tooth.root**-2))
+    return shape.signed(float((1 + shape.poisson) / (2 * np.pi) * tooth.base**2 * (tooth.bore**-2 - tooth.root**-2)))
 
 
 def _readable_arcs(tooth: Tooth) -> np.ndarray:
@@ -108,7 +109,7 @@ def _patches(tooth: Tooth, mesh: Sector, rho: np.ndarray) -> Places:
     weights = np.sin(angle) ** 2 / np.sum(np.sin(angle) ** 2)
     columns = []
     for arc in tooth.arc(rho):
-        points = _on_flank(tooth, mesh, np.sqrt(2 * tooth.base * (arc + _PATCH * np.cos(angle))))
+        points = _on_flank(tooth, mesh, tooth.roll_length(arc + _PATCH * np.cos(angle)))
         columns.append(points.weights @ weights)
     return Places(np.stack(columns, axis=1))
 

@@ -9,7 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from ...geometry import Gear, GearPair, check_spur
+from ...geometry import Gear, GearPair, RingGear, check_spur
 from ...numerics import AbstractSpring, Checked, check, concrete, program
 from ..assembly import AbstractCompliance, Outside, Structures, between_planes, with_edge
 from ..hertz import ContactGeometry, DepthReferenced
@@ -126,13 +126,14 @@ def finite_element_compliance(
     wheel_table: str | Path | None = None,
     cache: str | Path | bool | None = True,
 ) -> TabulatedCompliance:
-    """Teeth and gear bodies by finite elements: two-dimensional, whole ring, bore held rigidly, once per gear.
+    """Teeth and gear bodies by finite elements: two-dimensional, whole ring, once per gear. The bore is held rigidly, a
+    ring gear all round at its rim diameter.
 
     Takes one to three seconds per gear and plane, then comes from the disk. A table holds for every module, modulus,
     face width, centre distance, torque and modification of the gear.
 
     Args:
-        pair: gear pair of concrete numbers.
+        pair: spur gear pair of concrete numbers, external or internal.
         plane: as in `default_compliance`.
         pinion_table, wheel_table: tables of another program for that gear, as for a thin rim or a web, in the format
             of `write_table`. In plane "auto" such a table is taken as it is.
@@ -142,8 +143,8 @@ def finite_element_compliance(
         for `prepare`. See `TabulatedCompliance` for what may vary and what it is differentiable by.
 
     Raises:
-        ValueError: for numbers that are traced, a shape that cannot be meshed, or a table that cannot be right, naming
-            the number or the line.
+        ValueError: for helical gears, a ring gear with a `support`, numbers that are traced, a shape that cannot be
+            meshed, or a table that cannot be right, naming the number or the line.
     """
     check_plane_state(plane)
     _check_known(pair)
@@ -179,6 +180,8 @@ def _check_known(pair: GearPair) -> None:
     for name, gear in zip(("pinion", "wheel"), pair.gears):
         if gear.protuberance is not None:
             raise ValueError(f"{name} protuberance: must be left out, its fillet is not known here yet")
+        if isinstance(gear, RingGear) and gear.support is not None:
+            raise ValueError(f"{name} support: must be None, finite elements hold the rim of a ring gear all round")
 
 
 def _concrete(gear: Gear, plane: Plane) -> tuple[Shape, float]:

@@ -9,7 +9,7 @@ import numpy as np
 import scipy  # its packages load when they are used
 from jaxtyping import Array, Float
 
-from ...geometry import Gear
+from ...geometry import Gear, RingGear
 from ...numerics import real
 from ...numerics.spline import cell
 from ..plane import Plane, plane_modulus, plane_poisson
@@ -32,6 +32,8 @@ _HELD = (
     "tooth_thickness_tolerance",
 )
 _CUTTER = "cutter_teeth", "cutter_profile_shift"  # likewise, where there is one
+# likewise, where they are given; the module then moves their ratio to it
+_LENGTHS = "tip_diameter", "bore_diameter", "rim_diameter", "fillet_radius"
 
 _WORDS = {
     "tip_ratio": "tip_diameter over 2 module",
@@ -39,18 +41,23 @@ _WORDS = {
     "poisson": "Poisson's ratio of the plane problem",
     "allowance": "tooth_thickness_allowance over module",
 }
+_WORDS_OF_RINGS = {"bore_ratio": "rim_diameter over 2 module"}
+_WORDS_OF_FILLETS = {"root_radius": "fillet_radius over module"}
+_SIGNED = "teeth", "tip_ratio", "bore_ratio"  # negative for a ring gear, given as positive numbers
+_KINDS = "an external gear", "a ring gear"
 
 _ALLOWANCE = Shape._fields.index("allowance")
 
 
 class GearTable(eqx.Module):
-    """Deflection of one gear along its load lines, bore fixed; roll lengths from the form circle to the tip.
+    """Deflection of one gear along its load lines, bore fixed, or the rim circle of a ring gear; roll lengths from the
+    form circle to the tip.
 
     Attributes:
         shape: `numbers` of the `Shape` of the gear that it is for.
         module: that it is for [mm].
         modulus: of the plane problem, E', that it is for [MPa].
-        roll_length: increasing [mm], shape (points,).
+        roll_length: increasing, negative for a ring gear [mm], shape (points,).
         center: displacement of the point where the load line crosses the tooth's centreline, [um per N/mm], (points,).
         local: displacement of the flank against that point, beyond the depth-referenced law [um per N/mm], (points,).
         neighbours: displacement of the flanks of the teeth counter-clockwise of the loaded one, where the load pushes
@@ -118,13 +125,14 @@ def scaled(shape: Shape, numbers: GearNumbers, hub: float, module: float, modulu
 def shape_of(gear: Gear, plane: Plane) -> Float[Array, " numbers"]:
     """The `numbers` of the `Shape` that a gear's table depends on; they may be traced."""
     cutter = [getattr(gear, name) for name in _CUTTER] if gear.cutter_teeth is not None else []
+    fillet = gear.fillet_radius if isinstance(gear, RingGear) else None
     return jnp.stack(
         [
-            gear.teeth,
+            gear.signed(gear.teeth),
             gear.pressure_angle,
             gear.profile_shift,
             gear.dedendum,
-            gear.root_radius,
+            gear.root_radius if fillet is None else fillet / gear.module,
             gear.tip_radius / gear.module,
             gear.bore_radius / gear.module,
             plane_poisson(gear.material, plane),
@@ -159,24 +167,30 @@ class Scale(eqx.Module):
 
 def different(table: GearTable, shape: Shape) -> str | None:
     """The first number of a gear that is not that of its table, in words; both are concrete."""
-    numbers = [*zip(Shape._fields, Shape(*map(float, np.asarray(table.shape, float))), shape)]
+    known = Shape(*map(float, np.asarray(table.shape, float)))
+    if known.is_internal != shape.is_internal:
+        return f"is {_KINDS[shape.is_internal]}, its table is of {_KINDS[known.is_internal]}"
+    words = _WORDS | (_WORDS_OF_RINGS if shape.is_internal else {})
+    words |= _WORDS_OF_FILLETS if shape.is_internal and not shape.cutter_teeth else {}
+    numbers = [*zip(Shape._fields, known, shape)]
     # a bore that is not given follows from the others: last, as it is not the reason
     for name, there, here in sorted(numbers, key=lambda number: number[0] == "bore_ratio"):
         if abs(here - there) > _ALIKE * max(abs(there), 1.0):
-            return f"{_WORDS.get(name, name)} = {here:.7g} differs from {there:.7g} of its table"
+            if name in _SIGNED:
+                here, there = abs(here), abs(there)
+            return f"{words.get(name, name)} = {here:.7g} differs from {there:.7g} of its table"
     return None
 
 
 def _without_unknown_derivatives(gear: Gear) -> Gear:
     """The gear; a derivative by a number that determines its table raises a `ValueError`."""
     names = _HELD if gear.cutter_teeth is None else (*_HELD, *_CUTTER)
-    held = {name: _held(name, getattr(gear, name)) for name in names}
-    ratios = [name for name in ("tip_diameter", "bore_diameter") if getattr(gear, name) is not None]
-    held |= {name: _held(name, getattr(gear, name)) for name in ratios}
+    ratios = [name for name in _LENGTHS if getattr(gear, name, None) is not None]
     if ratios:  # the module moves their ratio to it
-        held["module"] = _held("module", gear.module)
-    else:
-        held["addendum"] = _held("addendum", gear.addendum)
+        names = (*names, *ratios, "module")
+    if gear.tip_diameter is None:
+        names = (*names, "addendum")
+    held = {name: _held(name, getattr(gear, name)) for name in names if getattr(gear, name) is not None}
     poisson = _held("poisson_ratio", gear.material.poisson_ratio)
     replaced = [*held, "material"]
     material = eqx.tree_at(lambda m: m.poisson_ratio, gear.material, poisson)
@@ -215,7 +229,7 @@ def _held(name: str, value: Array) -> Array:
 
 def _refusal(name: str) -> str:
     if name == "module":
-        why = "it moves bore and tip against the module where bore_diameter or tip_diameter is given: leave both None"
+        why = f"it moves {', '.join(_LENGTHS[:-1])} or {_LENGTHS[-1]} against the module where given: leave them None"
     else:
         why = "its table is of one value: use default_compliance"
     return f"no derivative by {name}: {why}"

@@ -23,7 +23,8 @@ def write_table(path: str | Path, table: GearTable) -> None:
     """Writes the table of a gear as CSV; read again it is the same, bit by bit.
 
     Columns: `kind, neighbour, loaded_mm, displaced_mm, um_mm_per_N`, all loads 1 N per mm of face width, normal to the
-    flank at a roll length, all displacements along the load line, positive with the load, the bore held:
+    flank at a roll length, all displacements along the load line, positive with the load, the bore held, of a ring gear
+    the rim circle:
 
         kind        neighbour   loaded_mm   displaced_mm   um_mm_per_N
         module                                             module that the roll lengths are for [mm]; optional
@@ -35,9 +36,10 @@ def write_table(path: str | Path, table: GearTable) -> None:
 
     k counts the teeth counter-clockwise of the loaded one in the view in which the load pushes it counter-clockwise; it
     needs all k = 1 ... n, and k = -1 ... -n may be there too: table k over (rho, rho') is table -k over (rho', rho).
-    All parts have the same increasing roll lengths. Without module and modulus they are those of the gear, without hub
-    it is the torsion of the solid ring. `local` is the mean over the contact of what a flank under a Hertzian pressure
-    deflects beyond 2 q / (pi E') [asinh(h / a) - nu' h / (sqrt(h^2 + a^2) + h)], h the depth to the centreline.
+    All parts have the same increasing roll lengths; those of a ring gear are negative. Without module and modulus they
+    are those of the gear, without hub it is the torsion of the solid ring. `local` is the mean over the contact of what
+    a flank under a Hertzian pressure deflects beyond 2 q / (pi E') [asinh(h / a) - nu' h / (sqrt(h^2 + a^2) + h)], h
+    the depth to the centreline.
 
     Args:
         path: of the file.
@@ -72,11 +74,11 @@ def read_table(path: Path, shape: Shape, module: float, modulus: float, hub: flo
                 raise ValueError(f"{path}: line {line}: {kind} = {value:g} must be greater than 0")
             single[kind] = value
     curves = {kind: [row for row in rows if row[1] == kind] for kind in _CURVES}
-    rho = _increasing(path, "center", curves["center"])
+    rho = _increasing(path, "center", curves["center"], shape)
     center = np.array([row[5] for row in curves["center"]])
     local = np.zeros_like(rho)
     if curves["local"]:
-        if not np.array_equal(_increasing(path, "local", curves["local"]), rho):
+        if not np.array_equal(_increasing(path, "local", curves["local"], shape), rho):
             raise ValueError(f"{path}: line {curves['local'][0][0]}: loaded_mm of local must be that of center")
         local = np.array([row[5] for row in curves["local"]])
     numbers = GearNumbers(rho, center, local, _neighbours(path, rows, rho))
@@ -119,15 +121,17 @@ def _row(path: Path, line: int, cells: list[str]) -> Row:
     return line, kind, int(found[0]), found[1], found[2], found[3]
 
 
-def _increasing(path: Path, kind: str, rows: list[Row]) -> np.ndarray:
+def _increasing(path: Path, kind: str, rows: list[Row], shape: Shape) -> np.ndarray:
     """The roll lengths of a curve."""
     if len(rows) < _FEWEST:
         raise ValueError(f"{path}: {len(rows)} rows of kind {kind} must be at least {_FEWEST}")
     for before, row in zip(rows, rows[1:]):
         if not row[3] > before[3]:
             raise ValueError(f"{path}: line {row[0]}: loaded_mm = {row[3]:g} must be greater than {before[3]:g}")
-    if rows[0][3] < 0:
-        raise ValueError(f"{path}: line {rows[0][0]}: loaded_mm = {rows[0][3]:g} must be at least 0")
+    line, *_, nearest, _, _ = rows[-1] if shape.is_internal else rows[0]  # to the base circle
+    if shape.signed(nearest) < 0:
+        bound = "at most 0 for a ring gear" if shape.is_internal else "at least 0"
+        raise ValueError(f"{path}: line {line}: loaded_mm = {nearest:g} must be {bound}")
     return np.array([row[3] for row in rows])
 
 

@@ -4,10 +4,12 @@ A half sector has three blocks, each a Coons patch; the other half is its mirror
 
     tooth   from the flank and the upper half of the fillet (v = 0) to the centreline (v = 1), tip to the middle
     foot    from the lower half of the fillet and the root circle (v = 0) to an arc inside the ring (v = 1)
-    ring    from that arc to the bore
+    ring    from that arc to the bore, or outwards to the rim circle of a ring gear
 
 Tooth and foot meet on the line from the middle of the fillet to the point P on the centreline below the root, so that
 no element has an angle close to zero where the fillet meets the root circle. Layers are graded towards the surface.
+
+The tooth points upwards. Radii and polar angles of a ring gear are negative: its axis is above the tooth.
 """
 
 from typing import NamedTuple
@@ -34,7 +36,7 @@ class Sector(NamedTuple):
         points: nodes, shape (nodes, 2).
         elements: nodes of every element, shape (elements, 9), row by row in its local coordinates.
         left, right: nodes on the two cuts from the root inwards, without those on the bore, (cut,).
-        held: nodes on the bore.
+        held: nodes on the bore, or on the rim circle of a ring gear.
         flank: nodes along the working (right) flank's involute from the tip down, (2 edges + 1,).
         flank_arc: their length of involute from the base circle.
         centreline: nodes on the centreline from the tip down, (2 edges + 1,).
@@ -63,11 +65,12 @@ def sector(tooth: Tooth, fineness: float = 1.0) -> Sector:
     arcs, flank, fillet, root = _surface(tooth, fineness)
     inside = tooth.root - min(_INSIDE, _OF_RIM * (tooth.root - tooth.bore))
     layers = _graded(max(4, round(_LAYERS * fineness)), 1 + (_GROWTH - 1) / fineness)
-    tip = np.linalg.norm(flank[:, 0])
+    signed = tooth.shape.signed
+    tip = signed(float(np.linalg.norm(flank[:, 0])))
     upper = np.concatenate([flank, fillet[:, 1:]], axis=1)
     share = _lengths(upper)
     heights = tip + share * (inside - tip)
-    corner = np.arctan2(*flank[:, 0]) * (1 - layers)
+    corner = np.arctan2(*signed(flank[:, 0])) * (1 - layers)
     across = _line(fillet[:, -1], np.array([0.0, inside]), layers)
     axis = np.stack([np.zeros_like(heights), heights])
     tooth_block = _coons(upper, axis, tip * np.stack([np.sin(corner), np.cos(corner)]), across, layers)
@@ -84,7 +87,7 @@ def _surface(tooth: Tooth, fineness: float) -> tuple[np.ndarray, np.ndarray, np.
     """The right half of the surface from the tip to the cut: arcs of the involute, then points of three curves."""
     top, bottom = tooth.arc(tooth.tip_roll_length), tooth.arc(tooth.form_roll_length)
     arcs = np.linspace(top, bottom, 2 * _edges(top - bottom, _FLANK_EDGE / fineness) + 1)
-    flank = tooth.involute(np.sqrt(2 * tooth.base * arcs))
+    flank = tooth.involute(tooth.roll_length(arcs))
     middle = 0.5 * (tooth.junction + np.pi / 2)
     fine = tooth.trochoid(np.linspace(tooth.junction, middle, 400))
     fillet = _along(fine, _edges(_length(fine), _FILLET_EDGE / fineness))
@@ -92,7 +95,7 @@ def _surface(tooth: Tooth, fineness: float) -> tuple[np.ndarray, np.ndarray, np.
     foot = tooth.trochoid(np.linspace(middle, np.pi / 2, 400))
     end = tooth.sector_half_angle
     land = np.linspace(tooth.root_half_angle, end, 200)[1:]
-    if tooth.root_half_angle < end - 1e-6:
+    if abs(tooth.root_half_angle) < abs(end) - 1e-6:
         foot = np.concatenate([foot, tooth.root * np.stack([np.sin(land), np.cos(land)])], axis=1)
     root = _along(foot, _edges(_length(foot), _ROOT_EDGE / fineness))
     root[:, 0] = fillet[:, -1]
@@ -137,11 +140,11 @@ def _line(start: np.ndarray, end: np.ndarray, share: np.ndarray) -> np.ndarray:
 
 
 def _ring_radii(outer: float, bore: float, step: float, fineness: float) -> np.ndarray:
-    """Radii of the ring's nodes, growing steps from the outside in."""
+    """Radii of the ring's nodes, in steps that grow from the root to the circle that is held."""
     ends = [outer]
     while ends[-1] - bore > step:
         ends.append(ends[-1] - step)
-        step = min(step * _RING_GROWTH ** (1 / fineness), _RING_STEP / fineness * ends[-1])
+        step = min(step * _RING_GROWTH ** (1 / fineness), _RING_STEP / fineness * abs(ends[-1]))
     if len(ends) > 1 and ends[-1] - bore < 0.5 * step:
         ends.pop()
     return _with_middles(np.array([*ends, bore]))
@@ -207,10 +210,11 @@ def _check(found: Sector, tooth: Tooth) -> None:
     if narrowest > _NARROWEST:
         return
     rim = tooth.root - tooth.bore
+    body = "rim_diameter" if tooth.shape.is_internal else "bore_diameter"
     blame = (
-        f"bore_diameter leaves a rim of {rim:.3g} x module"
+        f"{body} leaves a rim of {rim:.3g} x module"
         if rim < 0.5 * _INSIDE
-        else f"teeth = {tooth.shape.teeth:g} with profile_shift = {tooth.shape.profile_shift:g}"
+        else f"teeth = {abs(tooth.shape.teeth):g} with profile_shift = {tooth.shape.profile_shift:g}"
     )
     raise ValueError(
         f"{blame}, which cannot be meshed: the narrowest angle of an element has the sine "

@@ -1,4 +1,4 @@
-"""Plane elasticity of a gear as a ring of equal sectors, held at the bore.
+"""Plane elasticity of a gear as a ring of equal sectors, held at the bore, or at the rim circle of a ring gear.
 
 The sector is factorised once with its cuts free. What joins the sectors are forces on the cuts: for each harmonic of
 the ring, in which a sector moves as its neighbour does but for a phase exp(2 pi i n / z), they follow from a small
